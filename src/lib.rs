@@ -1,0 +1,13 @@
+//! lodbake: the build tool for levels of detail.
+//!
+//! ```text
+//! scan ──▶ index ──▶ read ──▶ identify ──▶ plan ──▶ work ──▶ emit ──▶ report
+//! folder   stat     changed   unique      keys     look up,  scenes   facts,
+//!          only     scenes    meshes +    per      simplify, with     budgets
+//!                   only      instances   mesh     store     LODs
+//! ```
+//!
+//! The modules stand in the order of the data flow; a module uses only those above it (`tests/layers.rs` checks).
+//! `mesh` to `allocate` are pure: no I/O, no clock, no randomness; the same input gives the same bytes everywhere.
+
+pub mod mesh;
