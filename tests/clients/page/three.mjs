@@ -1,0 +1,171 @@
+// three.js in the page: loads a glTF with MSFT_lod, shows a level, draws it from fixed cameras.
+// Knows nothing of files and verdicts; load.mjs and picture.mjs drive it through `globalThis.client`.
+import * as THREE from 'three';
+import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
+import { DRACOLoader } from 'three/examples/jsm/loaders/DRACOLoader.js';
+import { KTX2Loader } from 'three/examples/jsm/loaders/KTX2Loader.js';
+import { RoomEnvironment } from 'three/examples/jsm/environments/RoomEnvironment.js';
+import { MeshoptDecoder } from 'meshoptimizer/decoder';
+import GLTFLodExtension from 'three-gltf-extensions/loaders/MSFT_lod/MSFT_lod.js';
+import { FIELD_OF_VIEW, camera as cameraOf, rhombicuboctahedron } from './views.mjs';
+
+let renderer;
+let loader;
+let pictureLight;
+let current = null;
+
+function start(urls) {
+  renderer = new THREE.WebGLRenderer({ antialias: false, preserveDrawingBuffer: true });
+  renderer.setPixelRatio(1);
+  document.body.append(renderer.domElement);
+  const draco = new DRACOLoader().setDecoderPath(urls.draco);
+  const ktx2 = new KTX2Loader().setTranscoderPath(urls.basis).detectSupport(renderer);
+  loader = new GLTFLoader().setDRACOLoader(draco).setKTX2Loader(ktx2).setMeshoptDecoder(MeshoptDecoder);
+  loader.register((parser) => new GLTFLodExtension(parser));
+}
+
+/** Frees what the last file held on the GPU. */
+function clear() {
+  if (!current) return;
+  current.scene.traverse((object) => {
+    object.geometry?.dispose();
+    object.skeleton?.dispose();
+    for (const material of [object.material ?? []].flat()) {
+      for (const value of Object.values(material)) if (value?.isTexture) (value.dispose(), value.image?.close?.());
+      material.dispose();
+    }
+  });
+  renderer.renderLists.dispose();
+  current = null;
+}
+
+async function load(url) {
+  clear();
+  const gltf = await loader.loadAsync(url);
+  const stage = new THREE.Scene();
+  const lods = [];
+  stage.add(gltf.scene);
+  gltf.scene.traverse((object) => {
+    object.frustumCulled = false;
+    if (object.isLOD) (lods.push(object), (object.autoUpdate = false));
+  });
+  current = { gltf, stage, scene: gltf.scene, lods, mixer: null };
+  show(0);
+  stage.updateMatrixWorld(true);
+  return { sphere: sphereOf(), levels: Math.max(1, ...lods.map((lod) => lod.levels.length)), animations: gltf.animations.length };
+}
+
+/** The bounding sphere of the box round everything drawn, as drawn now. */
+function sphereOf() {
+  const box = new THREE.Box3();
+  current.scene.traverseVisible((object) => {
+    if (object.geometry) box.expandByObject(object.isSkinnedMesh || object.isInstancedMesh ? object : shallow(object));
+  });
+  const sphere = box.isEmpty() ? new THREE.Sphere(new THREE.Vector3(), 1) : box.getBoundingSphere(new THREE.Sphere());
+  return { center: sphere.center.toArray(), radius: sphere.radius };
+}
+
+/** `expandByObject` descends into children, hidden levels too: a copy without them. */
+function shallow(object) {
+  const copy = new THREE.Mesh(object.geometry);
+  copy.matrixAutoUpdate = false;
+  copy.matrix.copy(object.matrixWorld);
+  copy.matrixWorld.copy(object.matrixWorld);
+  return copy;
+}
+
+/** Shows level `k` of every group, the last one where a group has fewer. */
+function show(k) {
+  for (const lod of current.lods) {
+    lod.levels.forEach((level, i) => (level.object.visible = i === Math.min(k, lod.levels.length - 1)));
+  }
+}
+
+function seek(seconds) {
+  const { gltf, scene } = current;
+  current.mixer ??= new THREE.AnimationMixer(scene);
+  for (const clip of gltf.animations) current.mixer.clipAction(clip).play();
+  current.mixer.setTime(seconds);
+  current.stage.updateMatrixWorld(true);
+}
+
+function triangles() {
+  let count = 0;
+  current.scene.traverseVisible((object) => {
+    if (!object.isMesh) return;
+    const { index, attributes } = object.geometry;
+    count += ((index ?? attributes.position).count / 3) * (object.isInstancedMesh ? object.count : 1);
+  });
+  return Math.round(count);
+}
+
+function draw(view, size) {
+  const camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW, 1, view.near, view.far);
+  camera.position.fromArray(view.eye);
+  if (Math.abs(view.eye[0] - view.target[0]) + Math.abs(view.eye[2] - view.target[2]) < 1e-9) camera.up.set(0, 0, -1);
+  camera.lookAt(...view.target);
+  camera.updateMatrixWorld(true);
+  const head = new THREE.DirectionalLight(0xffffff, 3);
+  head.position.copy(camera.position);
+  head.target.position.fromArray(view.target);
+  const lights = [head, head.target, new THREE.AmbientLight(0xffffff, 0.6)];
+  current.stage.add(...lights);
+  renderer.setSize(size, size, false);
+  renderer.render(current.stage, camera);
+  current.stage.remove(...lights);
+}
+
+/** Draws cells of one file (already loaded) onto a row of the sheet, which `picture` made. */
+function paintRow(sheet, row, request) {
+  const { size, levels, views, sphere, label, wire } = request;
+  if (!pictureLight) {
+    const generator = new THREE.PMREMGenerator(renderer);
+    pictureLight = generator.fromScene(new RoomEnvironment(), 0.04).texture;
+  }
+  current.stage.environment = pictureLight;
+  current.stage.environmentIntensity = 0.5;
+  current.stage.background = new THREE.Color(0xe8e8ec);
+  current.scene.traverse((object) => [object.material ?? []].flat().forEach((m) => (m.wireframe = wire)));
+  const directions = rhombicuboctahedron();
+  let column = 0;
+  for (const level of levels) {
+    show(level);
+    const caption = `${label}  L${level}  ${triangles().toLocaleString('en')} tri`;
+    for (const view of views) {
+      draw(cameraOf(sphere, directions[view % 24]), size);
+      const [x, y] = [column++ * size, row * (size + 16)];
+      sheet.drawImage(renderer.domElement, x, y + 16);
+      sheet.fillText(`${caption}  v${view}`, x + 4, y + 12, size - 8);
+    }
+  }
+}
+
+/** Draws `rows` = [{ url, label, levels: [..] | null for all, time }] and returns a PNG as base64. */
+async function picture(rows, { size, views, wire, sameFrame }) {
+  const canvas = document.createElement('canvas');
+  const facts = [];
+  let sheet = null;
+  let first = null;
+  for (const [i, row] of rows.entries()) {
+    const loaded = await load(row.url);
+    const levels = row.levels ?? [...Array(loaded.levels).keys()];
+    if (row.time > 0) seek(row.time);
+    first ??= loaded.sphere;
+    if (!sheet) {
+      const columns = Math.max(levels.length, ...rows.map((r) => r.levels?.length ?? loaded.levels)) * views.length;
+      canvas.width = columns * size;
+      canvas.height = rows.length * (size + 16);
+      sheet = canvas.getContext('2d');
+      sheet.fillStyle = '#fff';
+      sheet.fillRect(0, 0, canvas.width, canvas.height);
+      sheet.fillStyle = '#000';
+      sheet.font = '12px sans-serif';
+    }
+    paintRow(sheet, i, { size, levels, views, sphere: sameFrame ? first : loaded.sphere, label: row.label, wire });
+    facts.push(loaded);
+  }
+  clear();
+  return { png: canvas.toDataURL('image/png').split(',')[1], facts };
+}
+
+globalThis.client = { start, picture };
