@@ -11,3 +11,6 @@
 //! `mesh` to `allocate` are pure: no I/O, no clock, no randomness; the same input gives the same bytes everywhere.
 
 pub mod mesh;
+pub mod progress;
+pub mod command;
+pub mod cli;

@@ -1,0 +1,245 @@
+//! Events as plain lines, for logs and for `--quiet`.
+//!
+//! Reads no clock: progress is told at every tenth of the work, so a log has the same length on every machine.
+
+use std::io::Write;
+use std::sync::Mutex;
+
+use super::quantity::{count, plural};
+use super::{Event, Paint, Reporter, Sink, Summary, failure_message, write_line};
+
+/// Failed scenes named again at the end; more than these are counted only.
+const NAMED_AT_THE_END: usize = 20;
+
+/// How much is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Verbosity {
+    /// Errors only.
+    Quiet,
+    /// Errors, warnings, and progress at every tenth.
+    Normal,
+    /// Also each scene and each job.
+    Verbose,
+}
+
+/// Writes lines.
+pub struct Lines {
+    sink: Sink,
+    paint: Paint,
+    verbosity: Verbosity,
+    tally: Mutex<Tally>,
+}
+
+/// What has been done so far.
+#[derive(Default)]
+struct Tally {
+    files: Tenths,
+    jobs: Tenths,
+    failed: Vec<String>,
+}
+
+/// Counts to a total and speaks at each tenth of it.
+#[derive(Default)]
+struct Tenths {
+    done: u64,
+    total: u64,
+    told: u64,
+}
+
+impl Tenths {
+    /// One more; the percentage if a new tenth is complete.
+    fn step(&mut self) -> Option<u64> {
+        self.done += 1;
+        let tenth = (self.done * 10).checked_div(self.total)?.min(10);
+        let new = tenth > self.told;
+        self.told = tenth.max(self.told);
+        new.then_some(tenth * 10)
+    }
+}
+
+impl Lines {
+    /// Lines go to `sink`.
+    pub fn new(sink: Box<dyn Write + Send>, paint: Paint, verbosity: Verbosity) -> Self {
+        Self { sink: Mutex::new(sink), paint, verbosity, tally: Mutex::default() }
+    }
+
+    fn tell(&self, least: Verbosity, line: &str) {
+        if self.verbosity >= least {
+            write_line(&self.sink, line);
+        }
+    }
+
+    fn step(&self, what: &str, pick: impl Fn(&mut Tally) -> &mut Tenths) {
+        let line = {
+            let mut tally = self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let tenths = pick(&mut tally);
+            tenths.step().map(|percent| format!("{what} {percent} % ({} of {})", tenths.done, tenths.total))
+        };
+        if let Some(line) = line {
+            self.tell(Verbosity::Normal, &line);
+        }
+    }
+
+    fn failed(&self, path: &str, error: &str, hint: Option<&str>) {
+        self.tell(Verbosity::Quiet, &self.paint.error_lines(&failure_message(path, error), hint));
+        self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner).failed.push(path.to_owned());
+    }
+
+    fn finished(&self, summary: &Summary) {
+        let mut failed =
+            std::mem::take(&mut self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner).failed);
+        failed.sort();
+        if let Some(text) = failures(&failed, summary.files) {
+            self.tell(Verbosity::Normal, &format!("{} {text}", self.paint.error("error:")));
+        }
+    }
+}
+
+/// Names the failed scenes once more, since their errors may be far up in a long log. `None` when one line was enough.
+pub(super) fn failures(failed: &[String], files: u64) -> Option<String> {
+    if failed.len() < 2 {
+        return None;
+    }
+    let title = format!("{} of {} could not be baked:", count(failed.len() as u64), plural(files, "scene"));
+    let named = failed.iter().take(NAMED_AT_THE_END).cloned();
+    let rest = failed.len().saturating_sub(NAMED_AT_THE_END);
+    let rest = (rest > 0).then(|| format!("and {rest} more"));
+    Some(std::iter::once(title).chain(named).chain(rest).collect::<Vec<_>>().join("\n  "))
+}
+
+impl Reporter for Lines {
+    fn event(&self, event: &Event) {
+        match event {
+            Event::ScanFinished { files } => {
+                self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner).files.total = *files;
+                self.tell(Verbosity::Verbose, &format!("found {} scene files", count(*files)));
+            }
+            Event::PlanFinished { found, distinct, jobs, triangles } => {
+                self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner).jobs.total = *jobs;
+                if *jobs > 0 {
+                    let (found, distinct, triangles) = (count(*found), count(*distinct), count(*triangles));
+                    self.tell(
+                        Verbosity::Normal,
+                        &format!("{found} meshes, {distinct} distinct: {jobs} to bake, {triangles} triangles"),
+                    );
+                }
+            }
+            Event::SceneUnchanged { path } => {
+                self.tell(Verbosity::Verbose, &format!("unchanged {path}"));
+                self.step("scenes", |tally| &mut tally.files);
+            }
+            Event::SceneStarted { .. } => {}
+            Event::SceneRead { path, meshes, .. } => {
+                self.tell(Verbosity::Verbose, &format!("read {path}: {} meshes", count(*meshes)));
+            }
+            Event::JobStarted { mesh, triangles } => {
+                self.tell(Verbosity::Verbose, &format!("baking {mesh}: {} triangles", count(*triangles)));
+            }
+            Event::JobFinished { mesh, cached, .. } => {
+                let how = if *cached { "from the cache" } else { "baked" };
+                self.tell(Verbosity::Verbose, &format!("{how} {mesh}"));
+                self.step("meshes", |tally| &mut tally.jobs);
+            }
+            Event::ScenePlanned { path, reason, jobs } => {
+                self.tell(Verbosity::Normal, &format!("would bake {path}: {reason} ({} jobs)", count(*jobs)));
+            }
+            Event::SceneWritten { path, changed, .. } => {
+                let how = if *changed { "wrote" } else { "left untouched" };
+                self.tell(Verbosity::Verbose, &format!("{how} {path}"));
+                self.step("scenes", |tally| &mut tally.files);
+            }
+            Event::SceneFailed { path, error, hint } => {
+                self.failed(path, error, hint.as_deref());
+                self.step("scenes", |tally| &mut tally.files);
+            }
+            Event::Warning { message, hint } => {
+                self.tell(Verbosity::Normal, &self.paint.warning_lines(message, hint.as_deref()));
+            }
+            Event::Finished { summary, .. } => self.finished(summary),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+
+    /// A buffer that can be read while the writer owns it.
+    #[derive(Clone, Default)]
+    struct Buffer(Arc<Mutex<Vec<u8>>>);
+
+    impl Write for Buffer {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.0.lock().expect("no test panics while it writes").extend_from_slice(bytes);
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn told(verbosity: Verbosity, events: &[Event]) -> String {
+        let buffer = Buffer::default();
+        let lines = Lines::new(Box::new(buffer.clone()), Paint::OFF, verbosity);
+        for event in events {
+            lines.event(event);
+        }
+        let bytes = buffer.0.lock().expect("no test panics while it writes").clone();
+        String::from_utf8(bytes).expect("lines are UTF-8")
+    }
+
+    fn written(path: &str) -> Event {
+        Event::SceneWritten { path: path.into(), bytes: 1, changed: true }
+    }
+
+    fn failed(path: &str) -> Event {
+        Event::SceneFailed { path: path.into(), error: "no good".into(), hint: Some("mend it".into()) }
+    }
+
+    #[test]
+    fn progress_is_told_at_tenths_only() {
+        let mut events = vec![Event::ScanFinished { files: 200 }];
+        events.extend((0..200).map(|_| written("a.glb")));
+        let text = told(Verbosity::Normal, &events);
+        assert_eq!(text.lines().count(), 10);
+        assert_eq!(text.lines().next(), Some("scenes 10 % (20 of 200)"));
+        assert_eq!(text.lines().last(), Some("scenes 100 % (200 of 200)"));
+    }
+
+    #[test]
+    fn few_files_skip_tenths_rather_than_repeat_them() {
+        let text =
+            told(Verbosity::Normal, &[Event::ScanFinished { files: 3 }, written("a"), written("b"), written("c")]);
+        assert_eq!(text, "scenes 30 % (1 of 3)\nscenes 60 % (2 of 3)\nscenes 100 % (3 of 3)\n");
+    }
+
+    #[test]
+    fn quiet_tells_errors_only() {
+        let events = [
+            Event::ScanFinished { files: 2 },
+            Event::Warning { message: "odd".into(), hint: None },
+            written("a.glb"),
+            failed("b.glb"),
+            Event::Finished { summary: Summary::default(), seconds: 1.0 },
+        ];
+        assert_eq!(told(Verbosity::Quiet, &events), "error: `b.glb`: no good\nhint: mend it\n");
+    }
+
+    #[test]
+    fn several_failures_are_named_again_in_order() {
+        let summary = Summary { files: 3, failed: 2, ..Summary::default() };
+        let events = [failed("b"), failed("a"), Event::Finished { summary, seconds: 0.0 }];
+        assert!(told(Verbosity::Normal, &events).ends_with("error: 2 of 3 scenes could not be baked:\n  a\n  b\n"));
+    }
+
+    #[test]
+    fn a_long_list_of_failures_is_cut() {
+        let paths: Vec<String> = (0..25).map(|i| format!("{i:02}.glb")).collect();
+        let text = failures(&paths, 1000).expect("there are many");
+        assert!(text.starts_with("25 of 1,000 scenes"), "{text}");
+        assert!(text.ends_with("19.glb\n  and 5 more"), "{text}");
+    }
+}

@@ -1,0 +1,206 @@
+//! Events on a terminal: two bars that disappear when the work is done, and lines for what must be read.
+
+use std::fmt;
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+
+use super::lines::failures;
+use super::quantity::{count, duration, plural, short};
+use super::{Event, Paint, Reporter, Summary, failure_message};
+
+/// Redraws per second; more is flicker, and every redraw is a system call.
+const REDRAWS_PER_SECOND: u8 = 10;
+/// The clock of a long job goes on although no event comes.
+const TICK: Duration = Duration::from_millis(250);
+/// A rate from less than this is noise.
+const RATE_AFTER: Duration = Duration::from_millis(500);
+
+/// Draws bars on standard error.
+pub struct Terminal {
+    bars: MultiProgress,
+    files: ProgressBar,
+    jobs: ProgressBar,
+    paint: Paint,
+    verbose: bool,
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    phase: Phase,
+    meshes: u64,
+    meshes_done: u64,
+    running: Vec<(String, u64)>,
+    failed: Vec<String>,
+}
+
+/// What the first bar counts.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+enum Phase {
+    #[default]
+    Reading,
+    Writing,
+}
+
+impl Terminal {
+    /// Bars on standard error; `verbose` also tells each scene on a line that stays.
+    pub fn new(paint: Paint, verbose: bool) -> Self {
+        let bars = MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(REDRAWS_PER_SECOND));
+        let files = bars.add(ProgressBar::no_length().with_style(files_style()).with_prefix("scanning"));
+        let jobs = ProgressBar::hidden().with_style(jobs_style());
+        files.enable_steady_tick(TICK);
+        Self { bars, files, jobs, paint, verbose, state: Mutex::default() }
+    }
+
+    fn state(&self) -> std::sync::MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A line above the bars that stays.
+    fn say(&self, text: &str) {
+        let written = self.bars.println(text);
+        drop(written); // a closed terminal is no reason to stop a bake
+    }
+
+    fn detail(&self, text: &str) {
+        if self.verbose {
+            self.say(&self.paint.faint(text));
+        }
+    }
+
+    fn planned(&self, jobs: u64, triangles: u64) {
+        {
+            let mut state = self.state();
+            state.phase = Phase::Writing;
+            state.meshes = jobs;
+        }
+        self.files.set_prefix("scenes");
+        self.files.set_position(0);
+        if jobs > 0 {
+            self.jobs.set_length(triangles);
+            self.bars.add(self.jobs.clone());
+            self.jobs.set_prefix("meshes");
+            self.jobs.reset_elapsed();
+            self.jobs.reset_eta();
+            self.jobs.enable_steady_tick(TICK);
+            self.describe_jobs();
+        }
+    }
+
+    fn job_started(&self, mesh: &str, triangles: u64) {
+        self.state().running.push((mesh.to_owned(), triangles));
+        self.describe_jobs();
+    }
+
+    fn job_finished(&self, mesh: &str, triangles: u64, cached: bool) {
+        {
+            let mut state = self.state();
+            state.meshes_done += 1;
+            state.running.retain(|(running, _)| running != mesh);
+        }
+        if cached {
+            // Work that need not be done: out of the total, or the rate and the remaining time would be far too good.
+            self.jobs.dec_length(triangles);
+        } else {
+            self.jobs.inc(triangles);
+        }
+        self.describe_jobs();
+    }
+
+    /// `31/80  now 115 k triangles`: the largest mesh in work is the one people wait for.
+    fn describe_jobs(&self) {
+        let state = self.state();
+        let largest = state.running.iter().map(|(_, triangles)| *triangles).max();
+        let now = largest.map(|triangles| format!("  now {} triangles", short(triangles as f64))).unwrap_or_default();
+        self.jobs.set_message(format!("{}/{}{now}", count(state.meshes_done), count(state.meshes)));
+    }
+
+    fn scene_done(&self) {
+        self.files.inc(1);
+    }
+
+    fn failed(&self, path: &str, error: &str, hint: Option<&str>) {
+        self.say(&self.paint.error_lines(&failure_message(path, error), hint));
+        self.state().failed.push(path.to_owned());
+        self.scene_done();
+    }
+
+    fn finished(&self, summary: &Summary) {
+        self.jobs.finish_and_clear();
+        self.files.finish_and_clear();
+        let mut failed = std::mem::take(&mut self.state().failed);
+        failed.sort();
+        if let Some(text) = failures(&failed, summary.files) {
+            self.say(&format!("{} {text}", self.paint.error("error:")));
+        }
+    }
+}
+
+impl Reporter for Terminal {
+    fn event(&self, event: &Event) {
+        match event {
+            Event::ScanFinished { files } => {
+                self.files.set_length(*files);
+                self.files.set_prefix("reading");
+            }
+            Event::SceneStarted { path } => self.files.set_message(path.clone()),
+            Event::SceneRead { path, meshes, .. } => {
+                self.detail(&format!("read {path}: {}", plural(*meshes, "mesh piece")));
+                if self.state().phase == Phase::Reading {
+                    self.scene_done();
+                }
+            }
+            Event::SceneUnchanged { path } => {
+                self.detail(&format!("unchanged {path}"));
+                self.scene_done();
+            }
+            Event::PlanFinished { jobs, triangles, .. } => self.planned(*jobs, *triangles),
+            Event::JobStarted { mesh, triangles } => self.job_started(mesh, *triangles),
+            Event::JobFinished { mesh, triangles, cached } => self.job_finished(mesh, *triangles, *cached),
+            Event::ScenePlanned { path, reason, jobs } => {
+                self.say(&format!("would bake {path}: {reason} ({})", plural(*jobs, "job")));
+                self.scene_done();
+            }
+            Event::SceneWritten { path, changed, .. } => {
+                self.detail(&format!("{} {path}", if *changed { "wrote" } else { "left untouched" }));
+                self.files.set_message(path.clone());
+                self.scene_done();
+            }
+            Event::SceneFailed { path, error, hint } => self.failed(path, error, hint.as_deref()),
+            Event::Warning { message, hint } => self.say(&self.paint.warning_lines(message, hint.as_deref())),
+            Event::Finished { summary, .. } => self.finished(summary),
+        }
+    }
+}
+
+impl Drop for Terminal {
+    /// A bake that ends by an error leaves no half bar behind.
+    fn drop(&mut self) {
+        self.jobs.finish_and_clear();
+        self.files.finish_and_clear();
+    }
+}
+
+fn files_style() -> ProgressStyle {
+    ProgressStyle::with_template("{prefix:>8} {bar:24} {pos}/{len}  {wide_msg}")
+        .expect("the template is a constant")
+        .progress_chars("━╸ ")
+}
+
+fn jobs_style() -> ProgressStyle {
+    ProgressStyle::with_template("{prefix:>8} {bar:24} {msg}  {rate}")
+        .expect("the template is a constant")
+        .with_key("rate", write_rate)
+        .progress_chars("━╸ ")
+}
+
+/// `1.2 M triangles/s, 12.0 s left`, once there is something to go by.
+fn write_rate(state: &ProgressState, to: &mut dyn fmt::Write) {
+    if state.pos() == 0 || state.elapsed() < RATE_AFTER {
+        return;
+    }
+    let written = write!(to, "{} triangles/s, {} left", short(state.per_sec()), duration(state.eta()));
+    written.expect("a line in memory can be written");
+}
