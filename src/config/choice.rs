@@ -1,0 +1,137 @@
+//! The closed lists of values in `pipeline.toml`. Their doc comments are what an editor shows.
+//!
+//! Knows nothing of what the choices do: the rooms that act on them `match` on these types.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Declares an enum of names with `ALL`, `name` and `Display`, so that the list exists once.
+macro_rules! choice {
+    ($(#[$meta:meta])* $kind:ident { $($(#[$case_meta:meta])* $case:ident = $name:literal,)+ }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+        pub enum $kind { $($(#[$case_meta])* #[serde(rename = $name)] $case,)+ }
+
+        impl $kind {
+            /// Every case, in the order of the documentation.
+            pub const ALL: &'static [Self] = &[$(Self::$case,)+];
+
+            /// The name in `pipeline.toml` and in reports.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$case => $name,)+ }
+            }
+        }
+
+        impl std::fmt::Display for $kind {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str(self.name())
+            }
+        }
+    };
+}
+
+choice! {
+    /// What the contraction of an edge costs.
+    Metric {
+        /// One error over position, normals, texture coordinates and colours.
+        #[default]
+        Its = "its",
+        /// Quadric error of positions alone (Garland and Heckbert 1997); fastest, blind to textures.
+        Qem = "qem",
+    }
+}
+
+choice! {
+    /// How much work the simplifier spends on each mesh.
+    Effort {
+        /// Costs are summed along the way and never formed anew.
+        Fast = "fast",
+        /// Costs are formed anew from the mesh as it is now where that changes the order.
+        #[default]
+        Balanced = "balanced",
+    }
+}
+
+choice! {
+    /// Where a vertex goes when an edge is contracted.
+    Placement {
+        /// The best form for each mesh: `subset` where levels share the source's vertices, else `optimal`.
+        #[default]
+        Auto = "auto",
+        /// The point of least error; levels get vertices of their own.
+        Optimal = "optimal",
+        /// One of the two end points; levels can share the source's vertices.
+        Subset = "subset",
+    }
+}
+
+choice! {
+    /// File format of the outputs.
+    Format {
+        /// As the source: `.glb` stays `.glb`, `.gltf` stays `.gltf`; `.obj` becomes `.glb`.
+        #[default]
+        Source = "source",
+        /// One binary file.
+        Glb = "glb",
+        /// JSON with a `.bin` beside it.
+        Gltf = "gltf",
+    }
+}
+
+choice! {
+    /// Where the vertices of the levels are kept.
+    Storage {
+        /// `compact` or `shared`, whichever makes the smaller file, chosen for each level.
+        #[default]
+        Smallest = "smallest",
+        /// Each level has its own vertices: more bytes on disk, fewer in use when only a coarse level is loaded.
+        Compact = "compact",
+        /// Levels index the source's vertices and add indices only; implies placement `subset`.
+        Shared = "shared",
+    }
+}
+
+choice! {
+    /// The reader that the outputs are written for.
+    Profile {
+        /// three.js, Babylon.js and other readers of `MSFT_lod`.
+        #[default]
+        Web = "web",
+        /// No required extension at all: Bevy, Interchange.
+        Core = "core",
+        /// Unity's glTF importers.
+        Unity = "unity",
+        /// Unreal Engine: screen sizes say where a level starts.
+        Unreal = "unreal",
+        /// Godot: levels are named with the suffix `_LODn`.
+        Godot = "godot",
+        /// Babylon.js with progressive loading, coarsest level first.
+        BabylonStream = "babylon-stream",
+    }
+}
+
+choice! {
+    /// Unit of a level's `error`.
+    ErrorUnit {
+        /// Fraction of the sub-mesh's bounding radius.
+        #[default]
+        Radius = "radius",
+        /// Units of the sub-mesh's own space, before any transform of the scene.
+        Object = "object",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_what_serde_reads() {
+        for &metric in Metric::ALL {
+            assert_eq!(serde_json::to_value(metric).unwrap(), metric.name());
+        }
+        for &profile in Profile::ALL {
+            assert_eq!(serde_json::from_value::<Profile>(profile.name().into()).unwrap(), profile);
+        }
+    }
+}

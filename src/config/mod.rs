@@ -1,0 +1,108 @@
+//! `pipeline.toml` → [`Pipeline`]: the only place with defaults and ranges.
+//!
+//! Three steps: the text is parsed with its line numbers and checked against the schema (`check.rs`, `file.rs`), the
+//! rules between keys are applied (`resolve.rs`), and [`Pipeline::settings_for`] lays overrides over each other for one
+//! scene. Reads that one file; knows nothing of scenes, meshes or the cache.
+
+mod check;
+mod choice;
+pub mod defaults;
+mod error;
+mod file;
+mod globs;
+mod resolve;
+mod settings;
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+
+pub use choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Storage};
+pub use error::{ConfigError, Names, Place};
+pub use file::schema;
+pub use globs::Globs;
+pub use settings::{ChainSettings, EmitSettings, LevelTarget, SceneSettings, Screen, SimplifySettings, Weights};
+
+/// Overrides the `cache` key.
+pub const CACHE_VARIABLE: &str = "LODBAKE_CACHE";
+
+/// A folder: as the user wrote it, for messages, and where it is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Folder {
+    /// As written in `pipeline.toml` or the environment.
+    pub written: String,
+    /// Relative to the current folder, or absolute.
+    pub path: PathBuf,
+}
+
+impl Folder {
+    fn below(base: &Path, written: String) -> Self {
+        Self { path: base.join(&written), written }
+    }
+}
+
+impl std::fmt::Display for Folder {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.written)
+    }
+}
+
+/// A validated `pipeline.toml`.
+#[derive(Clone, Debug)]
+pub struct Pipeline {
+    /// Path of the file as the user wrote it.
+    pub file: String,
+    /// At least one; several are laid over each other in `output`.
+    pub inputs: Vec<Folder>,
+    /// Mirrors the inputs.
+    pub output: Folder,
+    /// Files that are scenes.
+    pub include: Globs,
+    /// Files and folders that are left out.
+    pub exclude: Globs,
+    /// `.gitignore` and `.ignore` files are obeyed.
+    pub ignore_files: bool,
+    /// Symbolic links are followed.
+    pub follow_links: bool,
+    /// May be deleted at any time.
+    pub cache: Folder,
+    /// Jobs at the same time; 0 means one for each core.
+    pub jobs: usize,
+    layer: resolve::Layer,
+    overrides: Vec<(Globs, resolve::Layer)>,
+}
+
+impl Pipeline {
+    /// Reads and validates a file; `LODBAKE_CACHE` is taken from the environment.
+    pub fn load(file: &Path) -> Result<Self, ConfigError> {
+        let written = file.display().to_string();
+        let text =
+            std::fs::read_to_string(file).map_err(|source| ConfigError::Read { file: written.clone(), source })?;
+        let cache = std::env::var_os(CACHE_VARIABLE).filter(|value| !value.is_empty()).map(PathBuf::from);
+        Self::parse(&text, &written, cache)
+    }
+
+    /// Validates `text`. Relative paths are relative to the folder of `file`, except `cache`, the value of
+    /// `LODBAKE_CACHE`, which is relative to the current folder.
+    pub fn parse(text: &str, file: &str, cache: Option<PathBuf>) -> Result<Self, ConfigError> {
+        let schema = file::schema();
+        let document = check::Document::parse(file, text, &schema)?;
+        resolve::pipeline(&document, file, cache)
+    }
+
+    /// The settings of one scene: `relative` is its path below the input folder, with `/` as separator.
+    pub fn settings_for(&self, relative: &str) -> SceneSettings {
+        let mut layer = self.layer.clone();
+        for (globs, over) in &self.overrides {
+            if globs.matches(relative) {
+                layer.lay(over);
+            }
+        }
+        layer.settle()
+    }
+
+    /// The settings of scenes that no override matches.
+    pub fn settings(&self) -> SceneSettings {
+        self.layer.settle()
+    }
+}

@@ -1,0 +1,266 @@
+//! From the file's keys to settings: defaults, overrides on top of each other, and the rules that need more than one
+//! key to tell.
+
+use std::path::{Component, Path, PathBuf};
+
+use super::check::Document;
+use super::choice::{ErrorUnit, Placement, Storage};
+use super::error::{ConfigError, Place};
+use super::file::{LodEntry, OneOrMany, OverrideEntry, PipelineFile, ScreenTable, SimplifyTable};
+use super::globs::Globs;
+use super::settings::{ChainSettings, EmitSettings, LevelTarget, SceneSettings, Screen, SimplifySettings, Weights};
+use super::{Folder, Pipeline, defaults};
+
+/// The settings that an override may change; an absent key leaves what is below it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Layer {
+    skip: Option<bool>,
+    format: Option<super::Format>,
+    storage: Option<Storage>,
+    profile: Option<super::Profile>,
+    vertex_cache: Option<bool>,
+    screen: ScreenTable,
+    simplify: SimplifyTable,
+    lod: Option<Vec<LodEntry>>,
+}
+
+/// Lays `over` on `under`, for the named fields.
+macro_rules! lay {
+    ($over:expr, $under:expr; $($field:ident),+) => { $( if $over.$field.is_some() { $under.$field.clone_from(&$over.$field); } )+ };
+}
+
+impl Layer {
+    /// Keys of `over` win.
+    pub fn lay(&mut self, over: &Self) {
+        lay!(over, self; skip, format, storage, profile, vertex_cache, lod);
+        lay!(over.screen, self.screen; pixels, height, fov);
+        lay!(over.simplify, self.simplify; metric, effort, normal, texcoord, color, border, seam, crease);
+        lay!(over.simplify, self.simplify; placement, min_triangles, lock_border);
+    }
+
+    /// Fills what is still absent with defaults.
+    pub fn settle(&self) -> SceneSettings {
+        let storage = self.storage.unwrap_or_default();
+        let (levels, coverage) = match &self.lod {
+            Some(entries) => {
+                (entries.iter().filter_map(target).collect(), entries.iter().map(|e| e.coverage).collect())
+            }
+            None => (defaults::RATIOS.map(LevelTarget::Ratio).to_vec(), None),
+        };
+        SceneSettings {
+            skip: self.skip.unwrap_or(false),
+            min_triangles: self.simplify.min_triangles.unwrap_or(defaults::MIN_TRIANGLES) as usize,
+            simplify: self.simplify_settings(storage),
+            chain: ChainSettings { levels, storage, vertex_cache: self.vertex_cache.unwrap_or(true) },
+            emit: EmitSettings {
+                format: self.format.unwrap_or_default(),
+                profile: self.profile.unwrap_or_default(),
+                screen: Screen {
+                    pixels: self.screen.pixels.unwrap_or(defaults::PIXELS),
+                    height: self.screen.height.unwrap_or(defaults::SCREEN_HEIGHT),
+                    fov: self.screen.fov.unwrap_or(defaults::FIELD_OF_VIEW),
+                },
+                coverage,
+            },
+        }
+    }
+
+    fn simplify_settings(&self, storage: Storage) -> SimplifySettings {
+        let table = &self.simplify;
+        SimplifySettings {
+            metric: table.metric.unwrap_or_default(),
+            effort: table.effort.unwrap_or_default(),
+            weights: Weights {
+                normal: table.normal.unwrap_or(defaults::NORMAL),
+                texcoord: table.texcoord.unwrap_or(defaults::TEXCOORD),
+                color: table.color.unwrap_or(defaults::COLOR),
+                border: table.border.unwrap_or(defaults::BORDER),
+                seam: table.seam.unwrap_or(defaults::SEAM),
+                crease: table.crease.unwrap_or(defaults::CREASE),
+            },
+            placement: match storage {
+                Storage::Shared => Placement::Subset,
+                _ => table.placement.unwrap_or_default(),
+            },
+            lock_border: table.lock_border.unwrap_or(false),
+        }
+    }
+}
+
+/// The whole pipeline; `cache` is the value of `LODBAKE_CACHE`, relative to the current folder.
+pub(super) fn pipeline(document: &Document<'_>, file: &str, cache: Option<PathBuf>) -> Result<Pipeline, ConfigError> {
+    let typed = document.typed()?;
+    let base = Path::new(file).parent().unwrap_or(Path::new("")).to_path_buf();
+    let top = Place::default();
+    let (inputs, output) = folders(document, &typed, &base)?;
+    let include = typed.include.map_or_else(|| defaults::INCLUDE.map(str::to_owned).to_vec(), OneOrMany::into_vec);
+    let include = globs(document, &top.key("include"), include)?;
+    let exclude = globs(document, &top.key("exclude"), typed.exclude.map(OneOrMany::into_vec).unwrap_or_default())?;
+    let cache = match cache {
+        Some(path) => Folder { written: path.display().to_string(), path },
+        None => Folder::below(&base, typed.cache.unwrap_or_else(|| defaults::CACHE.to_owned())),
+    };
+    let layer = Layer {
+        skip: None,
+        format: typed.format,
+        storage: typed.storage,
+        profile: typed.profile,
+        vertex_cache: typed.vertex_cache,
+        screen: typed.screen.unwrap_or_default(),
+        simplify: typed.simplify.unwrap_or_default(),
+        lod: typed.lod,
+    };
+    check_layer(document, &top, &layer)?;
+    let mut overrides = Vec::new();
+    for (i, entry) in typed.overrides.unwrap_or_default().into_iter().enumerate() {
+        overrides.push(override_layer(document, &top.key("override").index(i), entry)?);
+    }
+    Ok(Pipeline {
+        file: file.to_owned(),
+        inputs,
+        output,
+        include,
+        exclude,
+        ignore_files: typed.ignore_files.unwrap_or(false),
+        follow_links: typed.follow_links.unwrap_or(true),
+        cache,
+        jobs: typed.jobs.unwrap_or(0) as usize,
+        layer,
+        overrides,
+    })
+}
+
+fn override_layer(document: &Document<'_>, place: &Place, entry: OverrideEntry) -> Result<(Globs, Layer), ConfigError> {
+    let globs = globs(document, &place.key("match"), entry.matching.into_vec())?;
+    let layer = Layer {
+        skip: entry.skip,
+        format: entry.format,
+        storage: entry.storage,
+        profile: entry.profile,
+        vertex_cache: entry.vertex_cache,
+        screen: entry.screen.unwrap_or_default(),
+        simplify: entry.simplify.unwrap_or_default(),
+        lod: entry.lod,
+    };
+    check_layer(document, place, &layer)?;
+    Ok((globs, layer))
+}
+
+fn globs(document: &Document<'_>, place: &Place, patterns: Vec<String>) -> Result<Globs, ConfigError> {
+    let written = patterns.clone();
+    Globs::new(patterns).map_err(|(index, cause)| {
+        let pattern = written.get(index).map_or("", String::as_str);
+        document.invalid(&place.index(index), format!("`{pattern}` is not a glob: {cause}"))
+    })
+}
+
+/// Rules within one table and its `[[lod]]` list.
+fn check_layer(document: &Document<'_>, place: &Place, layer: &Layer) -> Result<(), ConfigError> {
+    if layer.storage == Some(Storage::Shared) && layer.simplify.placement == Some(Placement::Optimal) {
+        let place = place.key("simplify").key("placement");
+        return Err(document.invalid(&place, "`optimal` moves vertices, so the levels cannot use storage `shared`"));
+    }
+    let place = place.key("lod");
+    let entries = layer.lod.as_deref().unwrap_or_default();
+    for (i, entry) in entries.iter().enumerate() {
+        let place = place.index(i);
+        if target(entry).is_none() {
+            return Err(document.invalid(&place, "must have exactly one of `ratio`, `triangles` and `error`"));
+        }
+        if entry.unit.is_some() && entry.error.is_none() {
+            return Err(document.invalid(&place.key("unit"), "is the unit of `error`, which this level does not have"));
+        }
+        if let Some(cause) = entries[..i].iter().rev().find_map(|finer| not_coarser(finer, entry)) {
+            return Err(document.invalid(&place, cause));
+        }
+    }
+    let given = entries.iter().filter(|entry| entry.coverage.is_some()).count();
+    if given != 0 && given != entries.len() {
+        let cause = format!("has `coverage` for {given} of {} levels: give it for all or for none", entries.len());
+        return Err(document.invalid(&place, cause));
+    }
+    Ok(())
+}
+
+/// Exactly one of the three, or `None`.
+fn target(entry: &LodEntry) -> Option<LevelTarget> {
+    match (entry.ratio, entry.triangles, entry.error) {
+        (Some(ratio), None, None) => Some(LevelTarget::Ratio(ratio)),
+        (None, Some(triangles), None) => Some(LevelTarget::Triangles(triangles)),
+        (None, None, Some(limit)) => Some(LevelTarget::Error { limit, unit: entry.unit.unwrap_or_default() }),
+        _ => None,
+    }
+}
+
+/// Why `entry` is not coarser than the `finer` level before it, where that can be told.
+fn not_coarser(finer: &LodEntry, entry: &LodEntry) -> Option<String> {
+    let descends = |what: &str, before: String, now: String| {
+        format!("has {what} {now} after {before}: levels go from fine to coarse, {what} must become smaller")
+    };
+    if let (Some(before), Some(now)) = (finer.coverage, entry.coverage)
+        && now >= before
+    {
+        return Some(descends("coverage", before.to_string(), now.to_string()));
+    }
+    match (target(finer)?, target(entry)?) {
+        (LevelTarget::Ratio(before), LevelTarget::Ratio(now)) if now >= before => {
+            Some(descends("ratio", before.to_string(), now.to_string()))
+        }
+        (LevelTarget::Triangles(before), LevelTarget::Triangles(now)) if now >= before => {
+            Some(descends("triangles", before.to_string(), now.to_string()))
+        }
+        (LevelTarget::Error { limit: before, unit: old }, LevelTarget::Error { limit: now, unit })
+            if old == unit && now <= before =>
+        {
+            let unit = if unit == ErrorUnit::Object { " object units" } else { "" };
+            Some(format!("has error {now} after {before}{unit}: levels go from fine to coarse, error must grow"))
+        }
+        _ => None,
+    }
+}
+
+/// Input and output folders, which must not swallow each other.
+fn folders(document: &Document<'_>, typed: &PipelineFile, base: &Path) -> Result<(Vec<Folder>, Folder), ConfigError> {
+    let top = Place::default();
+    let output = Folder::below(base, typed.output.clone());
+    let many = matches!(typed.input, OneOrMany::Many(_));
+    let mut inputs: Vec<Folder> = Vec::new();
+    for (i, written) in typed.input.clone().into_vec().into_iter().enumerate() {
+        let place = if many { top.key("input").index(i) } else { top.key("input") };
+        let input = Folder::below(base, written);
+        let plain = lexical(&input.path);
+        let out = lexical(&output.path);
+        if plain == out {
+            return Err(document.invalid(&place, format!("`{input}` is also the output: scenes would be overwritten")));
+        }
+        if plain.starts_with(&out) {
+            return Err(
+                document.invalid(&place, format!("`{input}` lies in the output `{output}`, which is not scanned"))
+            );
+        }
+        if inputs.iter().any(|other| lexical(&other.path) == plain) {
+            return Err(document.invalid(&place, format!("`{input}` is given twice")));
+        }
+        inputs.push(input);
+    }
+    if inputs.is_empty() {
+        return Err(document.invalid(&top.key("input"), "is empty: name at least one folder"));
+    }
+    Ok((inputs, output))
+}
+
+/// Without `.` and `..`; links are not followed, as the folders need not exist yet.
+fn lexical(path: &Path) -> PathBuf {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let mut plain = PathBuf::new();
+    for component in absolute.components() {
+        match component {
+            Component::ParentDir => {
+                plain.pop();
+            }
+            Component::CurDir => {}
+            other => plain.push(other),
+        }
+    }
+    plain
+}

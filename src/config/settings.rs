@@ -1,0 +1,128 @@
+//! Settings of one scene, resolved: no key is absent any more. Three records, by what they change.
+//!
+//! Knows nothing of the file they come from. `key.rs` says which of them enter which key.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Storage};
+use super::defaults;
+
+/// Everything that decides what becomes of one scene.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SceneSettings {
+    /// The scene is left out.
+    pub skip: bool,
+    /// Sub-meshes with fewer triangles are left alone.
+    pub min_triangles: usize,
+    /// What decides the contraction sequence of a sub-mesh.
+    pub simplify: SimplifySettings,
+    /// What decides the levels cut from that sequence.
+    pub chain: ChainSettings,
+    /// What decides how levels are written into a scene.
+    pub emit: EmitSettings,
+}
+
+/// What decides the contraction sequence of a sub-mesh.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SimplifySettings {
+    /// What the contraction of an edge costs.
+    pub metric: Metric,
+    /// How much work is spent.
+    pub effort: Effort,
+    /// Weights beside the geometric error, which has weight 1.
+    pub weights: Weights,
+    /// Where a vertex goes. Already `subset` where the storage is `shared`.
+    pub placement: Placement,
+    /// Vertices of open borders stay where they are.
+    pub lock_border: bool,
+}
+
+/// Weights of the parts of the error, each 0 or more; 0 leaves the part out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Weights {
+    /// Normals.
+    pub normal: f64,
+    /// Texture coordinates, each set.
+    pub texcoord: f64,
+    /// Vertex colours, each set.
+    pub color: f64,
+    /// Open borders.
+    pub border: f64,
+    /// Material and texture seams.
+    pub seam: f64,
+    /// Edges where normals part.
+    pub crease: f64,
+}
+
+impl Default for Weights {
+    fn default() -> Self {
+        Self {
+            normal: defaults::NORMAL,
+            texcoord: defaults::TEXCOORD,
+            color: defaults::COLOR,
+            border: defaults::BORDER,
+            seam: defaults::SEAM,
+            crease: defaults::CREASE,
+        }
+    }
+}
+
+/// What decides the levels of a sub-mesh, given its contraction sequence.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ChainSettings {
+    /// Finest first; never empty.
+    pub levels: Vec<LevelTarget>,
+    /// Where the vertices of the levels are kept.
+    pub storage: Storage,
+    /// Triangles and vertices are ordered for the GPU's caches.
+    pub vertex_cache: bool,
+}
+
+/// How coarse one level is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum LevelTarget {
+    /// Share of the source's triangles, between 0 and 1, exclusive.
+    Ratio(f64),
+    /// Number of triangles, 1 or more.
+    Triangles(u32),
+    /// Largest distance between the surfaces.
+    Error {
+        /// More than 0.
+        limit: f64,
+        /// What `limit` is measured in.
+        unit: ErrorUnit,
+    },
+}
+
+/// What decides how levels are written into a scene, given their bytes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EmitSettings {
+    /// File format of the output.
+    pub format: Format,
+    /// The reader that the output is written for.
+    pub profile: Profile,
+    /// Where a level's error must not be seen.
+    pub screen: Screen,
+    /// One for each level, strictly descending, more than 0, at most 1: the share of the viewport's height below which
+    /// the level is shown. `None`: computed from the level's error and `screen`.
+    pub coverage: Option<Vec<f64>>,
+}
+
+/// A level may be shown once its error covers at most `pixels` of a screen.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Screen {
+    /// Allowed error, in pixels; more than 0.
+    pub pixels: f64,
+    /// Height of the screen, in pixels; 1 or more.
+    pub height: f64,
+    /// Vertical field of view, in degrees; between 0 and 180, exclusive.
+    pub fov: f64,
+}
+
+impl Default for Screen {
+    fn default() -> Self {
+        Self { pixels: defaults::PIXELS, height: defaults::SCREEN_HEIGHT, fov: defaults::FIELD_OF_VIEW }
+    }
+}
