@@ -10,8 +10,9 @@
 //! The modules stand in the order of the data flow; a module uses only those above it (`tests/layers.rs` checks).
 //! `mesh` to `allocate` are pure: no I/O, no clock, no randomness; the same input gives the same bytes everywhere.
 
-pub mod config;
 pub mod mesh;
+pub mod config;
+pub mod gltf;
 pub mod progress;
 pub mod command;
 pub mod cli;

@@ -3,6 +3,8 @@
 //! Knows nothing of files, scenes, materials or transforms. Values are decoded floats; each attribute remembers
 //! the storage format of its source so that a level can be written in the same one.
 
+pub mod hash;
+
 use serde::{Deserialize, Serialize};
 
 /// Storage type of one component, as glTF `componentType` (5120…5126).

@@ -1,0 +1,141 @@
+//! What can be wrong with a glTF document, and where. Knows no paths of files and prints nothing.
+
+use std::fmt::Display;
+
+/// A fault at one place of a document: `meshes[2].primitives[0]: index 812 is out of range (640 vertices)`.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}{problem}", Self::prefix(place))]
+pub struct DocumentError {
+    /// JSON place, such as `meshes[2].primitives[0]`; empty for the file as a whole.
+    pub place: String,
+    /// What is wrong there.
+    pub problem: Problem,
+}
+
+/// Kinds of faults.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Problem {
+    /// The text is not JSON, or is nested too deeply.
+    #[error("invalid JSON at line {line} column {column}: {message}")]
+    Json {
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// In the parser's words.
+        message: String,
+    },
+    /// The binary container is damaged.
+    #[error("damaged GLB: {0}")]
+    Glb(String),
+    /// The file is in a version of glTF that is not 2.0.
+    #[error("glTF version `{0}` is not supported (known: 2.0)")]
+    Version(String),
+    /// A required property is absent.
+    #[error("`{0}` is missing")]
+    Missing(&'static str),
+    /// A value has another JSON type than the specification gives it.
+    #[error("expected {expected}, found {found}")]
+    Type {
+        /// With its article: `an array`.
+        expected: &'static str,
+        /// With its article: `a string`.
+        found: &'static str,
+    },
+    /// A reference points to nothing.
+    #[error("{kind} {index} does not exist (there are {count})")]
+    Unresolved {
+        /// `mesh`, `accessor`, …
+        kind: &'static str,
+        /// The reference.
+        index: u64,
+        /// Length of the array it points into.
+        count: usize,
+    },
+    /// A range of bytes or elements leaves what holds it.
+    #[error("{what} needs {needed} bytes, but {holder} has {available}")]
+    Short {
+        /// What asks.
+        what: String,
+        /// What holds.
+        holder: String,
+        /// Bytes asked for.
+        needed: u64,
+        /// Bytes there.
+        available: u64,
+    },
+    /// A vertex index points behind the last vertex.
+    #[error("index {index} is out of range ({vertices} vertices)")]
+    Index {
+        /// The index.
+        index: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// A buffer's or image's address cannot be used.
+    #[error("uri `{uri}` {reason}")]
+    Uri {
+        /// As written, shortened if long.
+        uri: String,
+        /// Why not.
+        reason: String,
+    },
+    /// A referenced file cannot be read.
+    #[error("cannot read `{uri}`: {reason}")]
+    File {
+        /// As written in the document.
+        uri: String,
+        /// In the operating system's words.
+        reason: String,
+    },
+    /// A compressed stream cannot be decoded.
+    #[error("cannot decode {extension}: {reason}")]
+    Decode {
+        /// The glTF extension.
+        extension: &'static str,
+        /// In the decoder's words.
+        reason: String,
+    },
+    /// A value that is neither a finite number nor usable otherwise.
+    #[error("element {element} is not finite ({value})")]
+    NotFinite {
+        /// Element of the accessor.
+        element: usize,
+        /// `NaN`, `inf` or `-inf`.
+        value: String,
+    },
+    /// Any other contradiction, in words.
+    #[error("{0}")]
+    Invalid(String),
+}
+
+impl DocumentError {
+    /// A fault at `place`.
+    pub fn new(place: impl Display, problem: Problem) -> Self {
+        Self { place: place.to_string(), problem }
+    }
+
+    /// A fault described in words.
+    pub fn invalid(place: impl Display, words: impl Into<String>) -> Self {
+        Self::new(place, Problem::Invalid(words.into()))
+    }
+
+    /// What a user can do about it, where that is known.
+    pub fn hint(&self) -> Option<&'static str> {
+        match &self.problem {
+            Problem::Version(_) => Some("convert the file to glTF 2.0 first"),
+            Problem::Glb(_) => Some("the file was probably cut short or changed in transfer; export or copy it again"),
+            Problem::Json { .. } => Some("check that the file is a complete glTF document"),
+            Problem::File { .. } => Some("keep the files a scene refers to beside it, under the names it uses"),
+            Problem::Uri { .. } => Some("refer to files by addresses relative to the scene"),
+            Problem::Short { .. } => Some("the binary data does not belong to this document, or was cut short"),
+            Problem::Decode { .. } => Some("export the scene again, or without compression"),
+            Problem::Index { .. } | Problem::NotFinite { .. } => Some("export the scene again, or exclude it"),
+            _ => None,
+        }
+    }
+
+    fn prefix(place: &str) -> String {
+        if place.is_empty() { String::new() } else { format!("{place}: ") }
+    }
+}

@@ -1,0 +1,70 @@
+//! A scene that was read: the lossless document beside its meshes as numbers.
+//!
+//! Types alone; `read` and `crate::obj` fill them. Later stages see nothing else of a source file.
+
+use super::buffers::Buffers;
+use super::dependencies::Dependency;
+use super::document::Document;
+use crate::mesh::Primitive;
+
+/// Everything a later stage may ask of one source file.
+#[derive(Debug)]
+pub struct Scene {
+    /// The file without loss.
+    pub document: Document,
+    /// The bytes its buffers stand for.
+    pub buffers: Buffers,
+    /// One for each entry of `meshes`, in order.
+    pub meshes: Vec<SourceMesh>,
+    /// External files the document refers to, sorted by address.
+    pub dependencies: Vec<Dependency>,
+    /// What was odd but could be read.
+    pub warnings: Vec<Warning>,
+}
+
+/// One entry of `meshes`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SourceMesh {
+    /// Index in `meshes`.
+    pub index: usize,
+    /// `name`, if it has one.
+    pub name: Option<String>,
+    /// One for each entry of `primitives`, in order.
+    pub primitives: Vec<SourcePrimitive>,
+}
+
+impl SourceMesh {
+    /// The triangle primitives with their indices in `primitives`.
+    pub fn triangle_primitives(&self) -> impl Iterator<Item = (usize, &Primitive)> {
+        self.primitives.iter().enumerate().filter_map(|(i, p)| match p {
+            SourcePrimitive::Triangles(primitive) => Some((i, primitive)),
+            SourcePrimitive::PassThrough { .. } => None,
+        })
+    }
+
+    /// Triangles of all primitives that have levels.
+    pub fn triangles(&self) -> usize {
+        self.triangle_primitives().map(|(_, p)| p.triangles()).sum()
+    }
+}
+
+/// One entry of a mesh's `primitives`.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SourcePrimitive {
+    /// Triangles: a list, whatever the source's mode.
+    Triangles(Primitive),
+    /// Stays as it is at every level.
+    PassThrough {
+        /// Why it gets no levels: `lines`, `no POSITION`, …
+        reason: String,
+    },
+}
+
+/// Something odd that did not prevent reading.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// JSON place, as in [`super::document::DocumentError`].
+    pub place: String,
+    /// What is odd, in words.
+    pub text: String,
+}
