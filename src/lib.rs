@@ -12,6 +12,7 @@
 
 pub mod mesh;
 pub mod config;
+pub mod scan;
 pub mod gltf;
 pub mod progress;
 pub mod command;

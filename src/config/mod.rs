@@ -23,13 +23,10 @@ pub use file::schema;
 pub use globs::Globs;
 pub use settings::{ChainSettings, EmitSettings, LevelTarget, SceneSettings, Screen, SimplifySettings, Weights};
 
-/// Overrides the `cache` key.
-pub const CACHE_VARIABLE: &str = "LODBAKE_CACHE";
-
 /// A folder: as the user wrote it, for messages, and where it is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Folder {
-    /// As written in `pipeline.toml` or the environment.
+    /// As written in `pipeline.toml` or on the command line.
     pub written: String,
     /// Relative to the current folder, or absolute.
     pub path: PathBuf,
@@ -38,6 +35,11 @@ pub struct Folder {
 impl Folder {
     fn below(base: &Path, written: String) -> Self {
         Self { path: base.join(&written), written }
+    }
+
+    /// A folder that was named elsewhere than in `pipeline.toml`.
+    pub fn at(path: PathBuf) -> Self {
+        Self { written: path.display().to_string(), path }
     }
 }
 
@@ -64,7 +66,7 @@ pub struct Pipeline {
     pub ignore_files: bool,
     /// Symbolic links are followed.
     pub follow_links: bool,
-    /// May be deleted at any time.
+    /// May be deleted at any time. `--cache` and `LODBAKE_CACHE` replace it (see `cli`).
     pub cache: Folder,
     /// Jobs at the same time; 0 means one for each core.
     pub jobs: usize,
@@ -73,21 +75,19 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// Reads and validates a file; `LODBAKE_CACHE` is taken from the environment.
+    /// Reads and validates a file.
     pub fn load(file: &Path) -> Result<Self, ConfigError> {
         let written = file.display().to_string();
         let text =
             std::fs::read_to_string(file).map_err(|source| ConfigError::Read { file: written.clone(), source })?;
-        let cache = std::env::var_os(CACHE_VARIABLE).filter(|value| !value.is_empty()).map(PathBuf::from);
-        Self::parse(&text, &written, cache)
+        Self::parse(&text, &written)
     }
 
-    /// Validates `text`. Relative paths are relative to the folder of `file`, except `cache`, the value of
-    /// `LODBAKE_CACHE`, which is relative to the current folder.
-    pub fn parse(text: &str, file: &str, cache: Option<PathBuf>) -> Result<Self, ConfigError> {
+    /// Validates `text`. Relative paths are relative to the folder of `file`.
+    pub fn parse(text: &str, file: &str) -> Result<Self, ConfigError> {
         let schema = file::schema();
         let document = check::Document::parse(file, text, &schema)?;
-        resolve::pipeline(&document, file, cache)
+        resolve::pipeline(&document, file)
     }
 
     /// The settings of one scene: `relative` is its path below the input folder, with `/` as separator.

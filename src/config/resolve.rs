@@ -87,8 +87,8 @@ impl Layer {
     }
 }
 
-/// The whole pipeline; `cache` is the value of `LODBAKE_CACHE`, relative to the current folder.
-pub(super) fn pipeline(document: &Document<'_>, file: &str, cache: Option<PathBuf>) -> Result<Pipeline, ConfigError> {
+/// The whole pipeline; `file` is its path.
+pub(super) fn pipeline(document: &Document<'_>, file: &str) -> Result<Pipeline, ConfigError> {
     let typed = document.typed()?;
     let base = Path::new(file).parent().unwrap_or(Path::new("")).to_path_buf();
     let top = Place::default();
@@ -96,10 +96,7 @@ pub(super) fn pipeline(document: &Document<'_>, file: &str, cache: Option<PathBu
     let include = typed.include.map_or_else(|| defaults::INCLUDE.map(str::to_owned).to_vec(), OneOrMany::into_vec);
     let include = globs(document, &top.key("include"), include)?;
     let exclude = globs(document, &top.key("exclude"), typed.exclude.map(OneOrMany::into_vec).unwrap_or_default())?;
-    let cache = match cache {
-        Some(path) => Folder { written: path.display().to_string(), path },
-        None => Folder::below(&base, typed.cache.unwrap_or_else(|| defaults::CACHE.to_owned())),
-    };
+    let cache = Folder::below(&base, typed.cache.unwrap_or_else(|| defaults::CACHE.to_owned()));
     let layer = Layer {
         skip: None,
         format: typed.format,

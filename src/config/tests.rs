@@ -3,7 +3,7 @@ use std::fmt::Write;
 use super::*;
 
 fn parse(text: &str) -> Result<Pipeline, ConfigError> {
-    Pipeline::parse(text, "project/pipeline.toml", None)
+    Pipeline::parse(text, "project/pipeline.toml")
 }
 
 fn minimal(rest: &str) -> Result<Pipeline, ConfigError> {
@@ -40,12 +40,11 @@ fn defaults_of_the_shortest_pipeline() {
 }
 
 #[test]
-fn environment_overrides_the_cache() {
-    let text = "input = \"a\"\noutput = \"b\"\ncache = \"c\"";
-    let pipeline = Pipeline::parse(text, "project/pipeline.toml", Some("elsewhere".into())).unwrap();
-    assert_eq!(pipeline.cache.path, Path::new("elsewhere"));
-    let pipeline = Pipeline::parse(text, "pipeline.toml", None).unwrap();
-    assert_eq!(pipeline.cache.path, Path::new("c"));
+fn paths_are_relative_to_the_file() {
+    let text = "input = 'a'\noutput = '../b'\ncache = 'c'";
+    let pipeline = Pipeline::parse(text, "pipeline.toml").unwrap();
+    assert_eq!(pipeline.cache, Folder { written: "c".to_owned(), path: "c".into() });
+    assert_eq!(parse(text).unwrap().output.path, Path::new("project/../b"));
 }
 
 #[test]
