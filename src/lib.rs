@@ -14,6 +14,7 @@ pub mod mesh;
 pub mod config;
 pub mod scan;
 pub mod gltf;
+pub mod key;
 pub mod progress;
 pub mod command;
 pub mod cli;
