@@ -8,7 +8,10 @@ use std::path::{Path, PathBuf};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::command::{CacheChoice, Context, Exit, OutputClosed, UsageError, completions};
+use crate::config::ConfigError;
+use crate::gltf::document::DocumentError;
 use crate::progress::{JsonLines, Lines, Paint, Reporter, Terminal, Verbosity};
+use crate::report::ReportError;
 
 /// The pipeline that a bare `lodbake` bakes.
 const DEFAULT_PIPELINE: &str = "pipeline.toml";
@@ -302,12 +305,19 @@ fn message(error: &anyhow::Error) -> String {
     text
 }
 
+/// The way out that the first cause with one offers.
 fn hint(error: &anyhow::Error) -> Option<String> {
-    error.chain().find_map(|cause| cause.downcast_ref::<UsageError>()?.hint.clone())
+    error.chain().find_map(|cause| {
+        let usage = cause.downcast_ref::<UsageError>().map(|e| e.hint.clone());
+        let config = || cause.downcast_ref::<ConfigError>().map(ConfigError::hint);
+        let document = || cause.downcast_ref::<DocumentError>().map(|e| e.hint().map(str::to_owned));
+        let report = || cause.downcast_ref::<ReportError>().map(|e| e.hint().map(str::to_owned));
+        usage.or_else(config).or_else(document).or_else(report).flatten()
+    })
 }
 
 fn exit(error: &anyhow::Error) -> Exit {
-    if has::<UsageError>(error) { Exit::Usage } else { Exit::Undone }
+    if has::<UsageError>(error) || has::<ConfigError>(error) { Exit::Usage } else { Exit::Undone }
 }
 
 /// Whether an error of that type is among the causes.

@@ -16,5 +16,6 @@ pub mod scan;
 pub mod gltf;
 pub mod key;
 pub mod progress;
+pub mod report;
 pub mod command;
 pub mod cli;

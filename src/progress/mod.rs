@@ -20,7 +20,7 @@ pub use terminal::Terminal;
 
 /// One thing that happened. `--json` writes each as one line; `type` is the name of the case in snake case.
 ///
-/// Paths are relative to the input folder, with `/`. Meshes are named by the first 16 hexadecimal digits of their hash.
+/// Paths are relative to the input folder, with `/`. Meshes are named by the first 12 hexadecimal digits of their hash.
 /// The order of events of different scenes and jobs depends on the threads; within one scene or job it does not.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case")]

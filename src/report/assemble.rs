@@ -1,0 +1,65 @@
+//! From the scenes' records to the whole record: order, sums and the list of distinct meshes.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{DistinctMesh, FORMAT, MeshRecord, Problem, Report, SceneRecord, Status, Totals};
+use crate::config::SceneSettings;
+use crate::mesh::hash::MeshHash;
+
+impl Report {
+    /// Puts the records of all scenes together, in whatever order they come.
+    pub fn new(settings: SceneSettings, mut scenes: Vec<SceneRecord>, mut problems: Vec<Problem>) -> Self {
+        scenes.sort_by(|a, b| a.path.cmp(&b.path));
+        problems.sort();
+        let meshes = distinct(&scenes);
+        let totals = totals(&scenes, meshes.len());
+        let tool = concat!("lodbake ", env!("CARGO_PKG_VERSION")).to_owned();
+        Self { format: FORMAT, tool, settings, totals, problems, scenes, meshes }
+    }
+}
+
+fn distinct(scenes: &[SceneRecord]) -> Vec<DistinctMesh> {
+    let mut found: BTreeMap<MeshHash, (DistinctMesh, BTreeSet<usize>)> = BTreeMap::new();
+    for (scene_index, scene) in scenes.iter().enumerate() {
+        for mesh in &scene.meshes {
+            for piece in &mesh.pieces {
+                let (entry, users) = found.entry(piece.hash).or_insert_with(|| {
+                    let (hash, triangles, vertices) = (piece.hash, piece.triangles, piece.vertices);
+                    let entry = DistinctMesh { hash, triangles, vertices, uses: 0, instances: 0, scenes: 0 };
+                    (entry, BTreeSet::new())
+                });
+                entry.uses += 1;
+                entry.instances += mesh.instances;
+                users.insert(scene_index);
+            }
+        }
+    }
+    found.into_values().map(|(entry, users)| DistinctMesh { scenes: users.len() as u64, ..entry }).collect()
+}
+
+fn totals(scenes: &[SceneRecord], distinct: usize) -> Totals {
+    let with = |status| scenes.iter().filter(|scene| scene.status == status).count() as u64;
+    let meshes = || scenes.iter().flat_map(|scene| &scene.meshes);
+    let levels = meshes().map(|mesh| mesh.levels.len()).max().unwrap_or(0);
+    let at = |level, weight: fn(&MeshRecord) -> u64| meshes().map(|m| triangles_at(m, level) * weight(m)).sum();
+    Totals {
+        files: scenes.len() as u64,
+        baked: with(Status::Baked),
+        copied: with(Status::Copied),
+        failed: with(Status::Failed),
+        skipped: with(Status::Skipped),
+        meshes_found: meshes().map(|mesh| mesh.pieces.len() as u64).sum(),
+        meshes_distinct: distinct as u64,
+        instances: meshes().map(|mesh| mesh.instances).sum(),
+        triangles_drawn: (0..=levels).map(|level| at(level, |mesh| mesh.instances)).collect(),
+        triangles_stored: (0..=levels).map(|level| at(level, |_| 1)).collect(),
+        bytes_in: scenes.iter().map(|scene| scene.bytes_in).sum(),
+        bytes_out: scenes.iter().map(|scene| scene.bytes_out).sum(),
+    }
+}
+
+/// Triangles of a mesh at a level; a mesh with fewer levels shows its last one. Level 0 is the source.
+fn triangles_at(mesh: &MeshRecord, level: usize) -> u64 {
+    let level = level.min(mesh.levels.len());
+    if level == 0 { mesh.triangles } else { mesh.levels[level - 1].triangles }
+}

@@ -1,0 +1,245 @@
+//! The record of what a pipeline's outputs are: every fact, for people, programs and later comparisons.
+//!
+//! It tells the state of the outputs, not the story of one run: no times, no thread counts, no cache hits and no
+//! absolute paths, so that the same inputs give the same record on any machine, after a cold run, a warm one or one
+//! that had nothing to do. (The story is in the events of `progress`.) Knows nothing of how the facts came about.
+
+mod assemble;
+mod json;
+mod table;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use json::{FILE_NAME, ReportError, Written, read, schema, to_json, write};
+pub use table::summary_table;
+
+use crate::config::{LevelTarget, SceneSettings};
+use crate::mesh::hash::MeshHash;
+
+/// Version of the record. A reader refuses a greater one; added fields do not raise it, changed meanings do.
+pub const FORMAT: u32 = 1;
+
+/// `report.json`. Scenes, meshes and problems are sorted; paths are relative, with `/`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Report {
+    /// Version of this record.
+    pub format: u32,
+    /// Program and version that wrote the outputs, e.g. `lodbake 0.1.0`.
+    pub tool: String,
+    /// Settings of every scene that does not list its own.
+    pub settings: SceneSettings,
+    /// Sums over all scenes.
+    pub totals: Totals,
+    /// What went wrong or is odd, by scene.
+    pub problems: Vec<Problem>,
+    /// One for each scene file found, by path.
+    pub scenes: Vec<SceneRecord>,
+    /// Distinct sub-meshes of all scenes, by hash.
+    pub meshes: Vec<DistinctMesh>,
+}
+
+/// Sums over all scenes. Failed scenes count in `files`, `failed` and `bytes_in` only.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Totals {
+    /// Scene files found.
+    pub files: u64,
+    /// Scenes with levels.
+    pub baked: u64,
+    /// Scenes written without levels, since they hold nothing to bake.
+    pub copied: u64,
+    /// Scenes that could not be baked.
+    pub failed: u64,
+    /// Scenes left out by a setting.
+    pub skipped: u64,
+    /// Sub-meshes declared in all scenes.
+    pub meshes_found: u64,
+    /// Distinct ones among them.
+    pub meshes_distinct: u64,
+    /// Nodes with a mesh in all scenes.
+    pub instances: u64,
+    /// Triangles drawn when every instance shows level `k`; `[0]` is the source. An instance with fewer levels shows
+    /// its last one.
+    pub triangles_drawn: Vec<u64>,
+    /// The same with every mesh of a file counted once, however many nodes show it.
+    pub triangles_stored: Vec<u64>,
+    /// Bytes of the source files: scenes and their buffers, not images.
+    pub bytes_in: u64,
+    /// Bytes of the outputs: scenes and their buffers, not images.
+    pub bytes_out: u64,
+}
+
+/// How far a scene got.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Written with levels.
+    Baked,
+    /// Written without levels, since it holds nothing to bake.
+    Copied,
+    /// Could not be baked; `problems` says why.
+    Failed,
+    /// Left out by a setting.
+    Skipped,
+}
+
+/// One scene file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SceneRecord {
+    /// Relative to its input folder.
+    pub path: String,
+    /// How far it got.
+    pub status: Status,
+    /// Its settings, where an override makes them differ from the report's.
+    pub settings: Option<SceneSettings>,
+    /// Bytes of the file and its buffers, not of images.
+    pub bytes_in: u64,
+    /// Bytes of `outputs`; 0 if there are none.
+    pub bytes_out: u64,
+    /// Files written for it, relative to the output folder: the scene first, then its buffers.
+    pub outputs: Vec<OutputRecord>,
+    /// One for each mesh of the file, in its order.
+    pub meshes: Vec<MeshRecord>,
+}
+
+/// One output file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct OutputRecord {
+    /// Relative to the output folder.
+    pub path: String,
+    /// Length in bytes.
+    pub bytes: u64,
+    /// BLAKE3 of the content, 64 hexadecimal digits.
+    pub hash: String,
+}
+
+/// One mesh of a scene file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MeshRecord {
+    /// Index in the file's `meshes`.
+    pub index: u64,
+    /// Its name in the file.
+    pub name: Option<String>,
+    /// Nodes that show it, in any scene of the file.
+    pub instances: u64,
+    /// Triangles of the source.
+    pub triangles: u64,
+    /// Vertices of the source.
+    pub vertices: u64,
+    /// Radius of the bounding sphere, in units of the mesh's own space.
+    pub radius: f64,
+    /// The sub-meshes it is made of.
+    pub pieces: Vec<PieceRecord>,
+    /// Its levels, finest first, without the source; empty if it is left alone.
+    pub levels: Vec<LevelRecord>,
+    /// What a person should know, e.g. why there are no levels, or an extension that levels do not carry.
+    pub notes: Vec<String>,
+}
+
+/// A sub-mesh in its place in a mesh: the smallest group of primitives that share border vertices.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PieceRecord {
+    /// Content hash, 64 hexadecimal digits.
+    #[schemars(with = "String")]
+    pub hash: MeshHash,
+    /// Indices in the mesh's `primitives`.
+    pub primitives: Vec<u64>,
+    /// Triangles of the source.
+    pub triangles: u64,
+    /// Vertices of the source.
+    pub vertices: u64,
+    /// Its part of each level of the mesh; empty if it is left alone.
+    pub levels: Vec<PieceLevel>,
+}
+
+/// A sub-mesh at one level.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PieceLevel {
+    /// Triangles left.
+    pub triangles: u64,
+    /// Largest distance between the surfaces of source and level, in units of the mesh's own space.
+    pub error: f64,
+    /// Why it is not coarser.
+    pub stop: Stop,
+}
+
+/// One level of a mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LevelRecord {
+    /// What was asked for.
+    pub target: LevelTarget,
+    /// Triangles of all pieces.
+    pub triangles: u64,
+    /// Vertices that the level uses, its own or the source's.
+    pub vertices: u64,
+    /// Bytes that the level adds to the output's buffers.
+    pub bytes: u64,
+    /// Largest distance between the surfaces of source and level, in units of the mesh's own space.
+    pub error: f64,
+    /// `error` as a fraction of the mesh's `radius`.
+    pub error_of_radius: f64,
+    /// Share of the viewport's height, covered by the bounding sphere, below which the level may be shown; 0 to 1.
+    pub coverage: f64,
+    /// Distance from which the level may be shown, in units of the mesh's own space.
+    pub distance: f64,
+    /// Why it is not coarser: of several pieces, the first reason that is not `target`.
+    pub stop: Stop,
+}
+
+/// Why a level has the triangles it has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Stop {
+    /// The target was reached.
+    Target,
+    /// Going on would have passed the error limit.
+    ErrorLimit,
+    /// No edge was left that may be contracted.
+    NoLegalPair,
+}
+
+/// One distinct sub-mesh of all scenes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct DistinctMesh {
+    /// Content hash, 64 hexadecimal digits.
+    #[schemars(with = "String")]
+    pub hash: MeshHash,
+    /// Triangles.
+    pub triangles: u64,
+    /// Vertices.
+    pub vertices: u64,
+    /// Times it is declared, in all files.
+    pub uses: u64,
+    /// Nodes that show it, in all files.
+    pub instances: u64,
+    /// Files that declare it.
+    pub scenes: u64,
+}
+
+/// How bad a problem is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// The scene was not baked.
+    Error,
+    /// The scene was baked all the same.
+    Warning,
+}
+
+/// Something that went wrong or is odd.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+pub struct Problem {
+    /// Scene file, relative to its input folder; none if it is not one scene's.
+    pub scene: Option<String>,
+    /// How bad it is.
+    pub severity: Severity,
+    /// Place in the file, e.g. `meshes[2].primitives[0]`; empty for the whole file.
+    pub place: String,
+    /// What is wrong.
+    pub cause: String,
+    /// What to do about it.
+    pub hint: Option<String>,
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,173 @@
+//! What a person reads at the end of a bake: a sentence, a few figures, and the triangles of each level.
+//!
+//! At most 80 columns, plain text: it reads the same in a log, in a pipe and without colour.
+
+use std::time::Duration;
+
+use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+
+use super::{MeshRecord, Report, Stop};
+use crate::config::{ErrorUnit, LevelTarget};
+use crate::progress::Summary;
+use crate::progress::quantity::{bytes, count, duration, plural};
+
+/// The end of a bake in words: `report` says what the outputs are, `summary` what this run did, in `wall` time.
+pub fn summary_table(report: &Report, summary: &Summary, wall: Duration) -> String {
+    let sentence = sentence(summary, wall);
+    if summary.baked + summary.copied == 0 {
+        return sentence;
+    }
+    let parts = [Some(sentence), Some(figures(report, summary)), levels(report), missed(report)];
+    parts.into_iter().flatten().collect::<Vec<_>>().join("\n\n")
+}
+
+/// `no work: 200 scenes unchanged (0.05 s)`, `baked 14 scenes, 186 unchanged, 1 failed (12.3 s)`.
+fn sentence(summary: &Summary, wall: Duration) -> String {
+    let time = duration(wall);
+    if summary.files == 0 {
+        return format!("no work: no scenes found ({time})");
+    }
+    let rest = [
+        (summary.copied, "copied"),
+        (summary.unchanged, "unchanged"),
+        (summary.skipped, "skipped"),
+        (summary.failed, "failed"),
+    ];
+    let mut parts: Vec<String> = rest
+        .iter()
+        .filter(|(number, _)| *number > 0)
+        .map(|(number, what)| format!("{} {what}", count(*number)))
+        .collect();
+    if summary.baked > 0 {
+        parts.insert(
+            0,
+            format!("{} {}", if summary.dry_run { "would bake" } else { "baked" }, plural(summary.baked, "scene")),
+        );
+    } else if summary.unchanged + summary.skipped == summary.files {
+        return format!("no work: {} unchanged ({time})", plural(summary.unchanged, "scene"));
+    }
+    format!("{} ({time})", parts.join(", "))
+}
+
+fn figures(report: &Report, summary: &Summary) -> String {
+    let totals = &report.totals;
+    let mut rows = vec![
+        vec!["meshes found".to_owned(), count(totals.meshes_found)],
+        vec![
+            "distinct".to_owned(),
+            format!("{}{}", count(totals.meshes_distinct), times(totals.meshes_found, totals.meshes_distinct)),
+        ],
+        vec!["jobs run".to_owned(), count(summary.jobs)],
+        vec!["cache hits".to_owned(), count(summary.cache_hits)],
+        vec!["bytes in".to_owned(), bytes(totals.bytes_in)],
+        vec![
+            "bytes out".to_owned(),
+            format!("{}{}", bytes(totals.bytes_out), change(totals.bytes_in, totals.bytes_out)),
+        ],
+    ];
+    if summary.warnings > 0 {
+        rows.push(vec!["warnings".to_owned(), count(summary.warnings)]);
+    }
+    columns(&[], rows, &[])
+}
+
+/// ` (13.7 times less)`, when there is something to save.
+fn times(found: u64, distinct: u64) -> String {
+    if distinct == 0 || found <= distinct {
+        return String::new();
+    }
+    format!("  (each used {:.1} times)", found as f64 / distinct as f64)
+}
+
+/// `  (+14 %)`
+fn change(before: u64, after: u64) -> String {
+    if before == 0 {
+        return String::new();
+    }
+    format!("  ({:+.0} %)", 100.0 * (after as f64 / before as f64 - 1.0))
+}
+
+/// Triangles of each level over all scenes. `None` if nothing has levels.
+fn levels(report: &Report) -> Option<String> {
+    let drawn = &report.totals.triangles_drawn;
+    let stored = &report.totals.triangles_stored;
+    if drawn.len() < 2 {
+        return None;
+    }
+    let rows = (0..drawn.len()).map(|level| {
+        let name = if level == 0 { "source".to_owned() } else { format!("level {level}") };
+        let asked = level.checked_sub(1).and_then(|k| report.settings.chain.levels.get(k));
+        let share = if stored[0] == 0 { 0.0 } else { stored[level] as f64 / stored[0] as f64 };
+        vec![
+            name,
+            asked.map(target).unwrap_or_default(),
+            count(stored[level]),
+            percent(share),
+            count(drawn[level]),
+            level.checked_sub(1).map(|k| percent(worst_error(report, k))).unwrap_or_default(),
+        ]
+    });
+    let header = ["", "asked", "triangles", "of source", "drawn", "worst error"];
+    Some(
+        columns(&header, rows.collect(), &[1, 2, 3, 4, 5])
+            + "\n(drawn: with every instance; error: of the mesh's radius)",
+    )
+}
+
+/// `50 %`, `1,000 triangles`, `0.5 % of radius`, `0.01 units`.
+pub fn target(target: &LevelTarget) -> String {
+    match *target {
+        LevelTarget::Ratio(ratio) => percent(ratio),
+        LevelTarget::Triangles(triangles) => format!("{} triangles", count(triangles.into())),
+        LevelTarget::Error { limit, unit: ErrorUnit::Radius } => format!("error {}", percent(limit)),
+        LevelTarget::Error { limit, unit: ErrorUnit::Object } => format!("error {limit}"),
+    }
+}
+
+/// `50 %`, `2.5 %`, `0.013 %`: at least two significant digits below 10 %.
+pub fn percent(fraction: f64) -> String {
+    let value = 100.0 * fraction;
+    let digits = if value == 0.0 || value >= 9.95 { 0 } else { (1.0 - value.log10().floor()).clamp(1.0, 6.0) as usize };
+    format!("{value:.digits$} %")
+}
+
+fn meshes(report: &Report) -> impl Iterator<Item = &MeshRecord> {
+    report.scenes.iter().flat_map(|scene| &scene.meshes)
+}
+
+fn worst_error(report: &Report, level: usize) -> f64 {
+    meshes(report).filter_map(|mesh| mesh.levels.get(level)).map(|level| level.error_of_radius).fold(0.0, f64::max)
+}
+
+/// How many levels stopped before their target, and why.
+fn missed(report: &Report) -> Option<String> {
+    let stops = || meshes(report).flat_map(|mesh| &mesh.levels).map(|level| level.stop);
+    let with = |stop| stops().filter(|s| *s == stop).count() as u64;
+    let (limit, no_pair) = (with(Stop::ErrorLimit), with(Stop::NoLegalPair));
+    if limit + no_pair == 0 {
+        return None;
+    }
+    let title =
+        format!("{} of {} stopped before the target:", count(limit + no_pair), plural(stops().count() as u64, "level"));
+    let reasons = [(limit, "at the error limit"), (no_pair, "with nothing left to contract")];
+    let told =
+        reasons.iter().filter(|(number, _)| *number > 0).map(|(number, why)| format!("{} {why}", count(*number)));
+    Some(std::iter::once(title).chain(told).collect::<Vec<_>>().join("\n  "))
+}
+
+/// Columns two spaces apart, those in `right` to the right; no rules, no trailing spaces.
+pub fn columns(header: &[&str], rows: Vec<Vec<String>>, right: &[usize]) -> String {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled).force_no_tty();
+    if !header.is_empty() {
+        table.set_header(header.iter().copied());
+    }
+    table.add_rows(rows);
+    for (index, column) in table.column_iter_mut().enumerate() {
+        column.set_padding((0, 2));
+        if right.contains(&index) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table.lines().map(|line| line.trim_end().to_owned()).collect::<Vec<_>>().join("\n")
+}
