@@ -10,7 +10,11 @@
 //! The modules stand in the order of the data flow; a module uses only those above it (`tests/layers.rs` checks).
 //! `mesh` to `allocate` are pure: no I/O, no clock, no randomness; the same input gives the same bytes everywhere.
 
+pub mod quadric;
 pub mod mesh;
+pub mod metric;
+pub mod simplify;
+pub mod distance;
 pub mod config;
 pub mod scan;
 pub mod gltf;

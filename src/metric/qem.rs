@@ -1,0 +1,118 @@
+//! `qem`: the plane quadric alone, accumulated; attributes are interpolated along the edge.
+//!
+//! M. Garland, P. Heckbert, *Surface simplification using quadric error metrics*, 1997; evaluation thesis, sections 2.1
+//! and 2.2: area-weighted planes, optimal point, border planes. The error is `sqrt(Δ / S)`, a length.
+
+use super::{ErrorMetric, Placement, Price};
+use crate::mesh::topology::{Contraction, EdgeKind, Topology};
+use crate::quadric::{Quadric, cross, dot, lerp, scale, sub};
+
+/// The metric.
+#[derive(Clone, Debug)]
+pub struct Qem {
+    placement: Placement,
+    quadrics: Vec<Quadric>,
+    areas: Vec<f64>,
+}
+
+impl Qem {
+    /// Prepares the quadrics of the whole surface; `border` weighs the planes at borders and seams.
+    pub fn new(surface: &Topology, border: f64, placement: Placement) -> Self {
+        let mut quadrics = vec![Quadric::default(); surface.positions.len()];
+        let mut areas = vec![0.0; surface.positions.len()];
+        for face in &surface.faces {
+            let p = surface.corners(face);
+            let normal = cross(sub(p[1], p[0]), sub(p[2], p[0]));
+            let length = dot(normal, normal).sqrt();
+            if length <= 0.0 {
+                continue;
+            }
+            let unit = scale(normal, 1.0 / length);
+            let plane = Quadric::plane(unit, -dot(unit, p[0]), 0.5 * length);
+            for (corner, &v) in face.v.iter().enumerate() {
+                quadrics[v as usize].add(&plane);
+                // A third of each incident face.
+                areas[v as usize] += length / 6.0;
+                if matches!(face.edges[corner], EdgeKind::Border | EdgeKind::Seam) {
+                    let end = face.v[(corner + 1) % 3];
+                    let across = cross(unit, sub(p[(corner + 1) % 3], p[corner]));
+                    // |across| is the edge's length, so the weight is its square.
+                    let edge = Quadric::plane(across, -dot(across, p[corner]), border);
+                    quadrics[v as usize].add(&edge);
+                    quadrics[end as usize].add(&edge);
+                }
+            }
+        }
+        Self { placement, quadrics, areas }
+    }
+
+    fn combined(&self, a: u32, b: u32) -> Quadric {
+        let mut q = self.quadrics[a as usize];
+        q.add(&self.quadrics[b as usize]);
+        q
+    }
+
+    fn finish(&self, a: u32, b: u32, cost: f64, position: [f64; 3]) -> Price {
+        let area = self.areas[a as usize] + self.areas[b as usize];
+        let cost = cost.max(0.0);
+        Price { cost, error: if area > 0.0 { (cost / area).sqrt() } else { 0.0 }, position, keep_second: false }
+    }
+
+    fn price_subset(&self, surface: &Topology, a: u32, b: u32, q: &Quadric) -> Option<Price> {
+        let (pa, pb) = (surface.positions[a as usize], surface.positions[b as usize]);
+        let (first, second) = (q.eval(pa), q.eval(pb));
+        let first_fits = wedges_fit(surface, a, b);
+        let keep_second = wedges_fit(surface, b, a) && (second < first || !first_fits);
+        if keep_second {
+            return Some(Price { keep_second, ..self.finish(a, b, second, pb) });
+        }
+        first_fits.then(|| self.finish(a, b, first, pa))
+    }
+}
+
+impl ErrorMetric for Qem {
+    fn price(&self, surface: &Topology, a: u32, b: u32) -> Option<Price> {
+        let q = self.combined(a, b);
+        if self.placement == Placement::Subset {
+            return self.price_subset(surface, a, b, &q);
+        }
+        let (pa, pb) = (surface.positions[a as usize], surface.positions[b as usize]);
+        let middle = lerp(pa, pb, 0.5);
+        let mut best = (q.eval(middle), middle);
+        for p in [Some(pa), Some(pb), q.minimum(middle)].into_iter().flatten() {
+            let cost = q.eval(p);
+            if cost < best.0 {
+                best = (cost, p);
+            }
+        }
+        Some(self.finish(a, b, best.0, best.1))
+    }
+
+    fn price_at(&self, _: &Topology, a: u32, b: u32, position: [f64; 3]) -> Option<Price> {
+        (self.placement == Placement::Optimal).then(|| {
+            let cost = self.combined(a, b).eval(position);
+            self.finish(a, b, cost, position)
+        })
+    }
+
+    fn contracted(&mut self, surface: &mut Topology, done: &Contraction) {
+        let (kept, gone) = (done.kept as usize, done.gone as usize);
+        self.quadrics[kept] = self.combined(done.kept, done.gone);
+        self.areas[kept] += self.areas[gone];
+        if self.placement == Placement::Optimal {
+            for &[stays, goes] in &done.merged {
+                for column in 0..surface.columns {
+                    let other = surface.value(goes)[column];
+                    let value = &mut surface.value_mut(stays)[column];
+                    *value += (other - *value) * done.t;
+                }
+            }
+        }
+    }
+}
+
+/// Every wedge of `gone` merges with exactly one wedge of `kept`, so that nothing but source vertices is left.
+fn wedges_fit(surface: &Topology, kept: u32, gone: u32) -> bool {
+    let Some(pairs) = surface.joined_wedges(kept, gone) else { return false };
+    surface.wedges(gone).all(|wedge| pairs.iter().filter(|p| p[1] == wedge).count() == 1)
+}

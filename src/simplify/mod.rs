@@ -1,0 +1,135 @@
+//! The driver: takes the cheapest legal pair, contracts it, writes it down, until nothing is left to contract.
+//!
+//! Generic over the metric and never knows which one it runs. Single-threaded and deterministic: ties go by vertex
+//! number. One run makes the whole sequence; every level is a cut of it ([`progressive`]).
+
+mod legal;
+pub mod progressive;
+pub mod replay;
+mod queue;
+
+use serde::{Deserialize, Serialize};
+
+use crate::mesh::Mesh;
+use crate::mesh::layout::{AttributeScale, Layout};
+use crate::mesh::topology::{Contraction, Topology};
+use crate::metric::its::{EdgeWeights, Its};
+use crate::metric::qem::Qem;
+use crate::metric::{ErrorMetric, Placement};
+use crate::quadric::lerp;
+use progressive::{Progressive, Recorder};
+use queue::Queue;
+
+/// Which metric prices contractions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum MetricKind {
+    /// [`crate::metric::its`]
+    Its,
+    /// [`crate::metric::qem`]
+    Qem,
+}
+
+impl MetricKind {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Its, Self::Qem];
+}
+
+/// Everything that decides the sequence, besides the mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The metric.
+    pub metric: MetricKind,
+    /// Where merged vertices go.
+    pub placement: Placement,
+    /// Weights of attributes in the price.
+    pub attributes: AttributeScale,
+    /// Weights of borders, seams and creases.
+    pub edges: EdgeWeights,
+}
+
+/// Simplifies `mesh` as far as it goes and returns the recorded sequence.
+pub fn simplify(mesh: &Mesh, settings: &Settings) -> Progressive {
+    let layout = Layout::new(mesh, settings.attributes);
+    let (mut surface, weld) = Topology::new(mesh, &layout);
+    let recorder = Recorder::new(&surface, &layout, weld);
+    build(&mut surface, settings, recorder)
+}
+
+/// The only place that builds a metric. The number of columns is a compile-time constant of `its`, so that its inner
+/// loops have known lengths.
+fn build(surface: &mut Topology, settings: &Settings, recorder: Recorder) -> Progressive {
+    if settings.metric == MetricKind::Qem {
+        let metric = Qem::new(surface, settings.edges.border, settings.placement);
+        return run(surface, metric, recorder);
+    }
+    // Widths that meshes have: nothing, normals, + one or two texture sets, + colours. Others are padded with zeros.
+    const WIDTHS: [usize; 9] = [0, 2, 3, 5, 7, 9, 12, 16, 32];
+    let width = WIDTHS.into_iter().find(|&width| surface.columns <= width).expect("a layout has at most 32 columns");
+    surface.resize_columns(width);
+    macro_rules! its {
+        ($($m:literal)*) => {
+            match width {
+                $($m => {
+                    let metric = Its::<$m>::new(surface, settings.edges, settings.placement);
+                    run(surface, metric, recorder)
+                })*
+                _ => unreachable!("a width of the list"),
+            }
+        };
+    }
+    its!(0 2 3 5 7 9 12 16 32)
+}
+
+fn run<E: ErrorMetric>(surface: &mut Topology, mut metric: E, mut recorder: Recorder) -> Progressive {
+    let mut queue = Queue::new(surface.positions.len());
+    let mut neighbours = Vec::new();
+    let mut done = Contraction::default();
+    loop {
+        let before = surface.alive;
+        fill(surface, &metric, &mut queue);
+        while let Some((a, b, cost)) = queue.pop() {
+            let Some(mut price) = metric.price(surface, a, b) else { continue };
+            // Prices are not kept up to date behind the queue's back: a pair is priced again when its turn comes.
+            if !queue.is_next(price.cost, cost) {
+                queue.push(a, b, price.cost);
+                continue;
+            }
+            if !legal::turns_gently(surface, a, b, price.position) {
+                let middle = lerp(surface.positions[a as usize], surface.positions[b as usize], 0.5);
+                let Some(other) = metric.price_at(surface, a, b, middle) else { continue };
+                if !legal::turns_gently(surface, a, b, middle) {
+                    continue;
+                }
+                price = other;
+            }
+            let (kept, gone) = if price.keep_second { (b, a) } else { (a, b) };
+            surface.contract(kept, gone, price.position, &mut done);
+            metric.contracted(surface, &done);
+            recorder.record(surface, &done, &price);
+            queue.merged(kept, gone);
+            surface.neighbours(kept, &mut neighbours);
+            for &other in &neighbours {
+                if let Some(price) = metric.price(surface, kept, other) {
+                    queue.push(kept, other, price.cost);
+                }
+            }
+        }
+        // Pairs that were illegal when their turn came may be legal now.
+        if surface.alive == before || surface.alive == 0 {
+            return recorder.finish();
+        }
+    }
+}
+
+fn fill<E: ErrorMetric>(surface: &Topology, metric: &E, queue: &mut Queue) {
+    let mut neighbours = Vec::new();
+    for a in 0..surface.positions.len() as u32 {
+        surface.neighbours(a, &mut neighbours);
+        for &b in neighbours.iter().filter(|&&b| a < b) {
+            if let Some(price) = metric.price(surface, a, b) {
+                queue.stage(a, b, price.cost);
+            }
+        }
+    }
+    queue.heapify();
+}

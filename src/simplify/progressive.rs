@@ -1,0 +1,139 @@
+//! The recorded sequence of one run: every contraction with the position and the wedge values it left behind.
+//!
+//! A cut after `k` contractions is a level. Replaying needs no adjacency: vertices and wedges are forests of merges, a
+//! triangle is gone when two of its corners have become one vertex.
+
+use serde::{Deserialize, Serialize};
+
+use crate::mesh::layout::Layout;
+use crate::mesh::topology::{Contraction, Topology};
+use crate::mesh::weld::Weld;
+use crate::metric::Price;
+
+/// The sequence. Positions are in object space, wedge values unscaled (as they will be written).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Progressive {
+    /// Vertices of the welded surface.
+    pub vertices: u32,
+    /// Wedges of the welded surface.
+    pub wedges: u32,
+    /// Columns of values recorded for each wedge.
+    pub columns: u32,
+    /// Triangles at the start, without those that have two corners at one vertex.
+    pub triangles: u32,
+    /// The contractions in order.
+    pub steps: Vec<Step>,
+    /// Wedge merges `[stays, gone]` of all steps.
+    pub merges: Vec<[u32; 2]>,
+    /// Wedges whose values a step set, of all steps.
+    pub set_wedges: Vec<u32>,
+    /// Their values, `columns` each.
+    pub set_values: Vec<f32>,
+}
+
+/// One contraction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Step {
+    /// Vertex that stays.
+    pub kept: u32,
+    /// Vertex that is gone.
+    pub gone: u32,
+    /// Where `kept` is from now on, object space.
+    pub position: [f32; 3],
+    /// Where that lies along the edge, 0 at `kept` … 1 at `gone`: passive attributes follow.
+    pub t: f32,
+    /// Cost in units of the object: comparable between sub-meshes of one run of the same metric.
+    pub cost: f32,
+    /// Geometric error in object space units.
+    pub error: f32,
+    /// Triangles left after this step.
+    pub triangles: u32,
+    /// End of this step's entries in [`Progressive::merges`].
+    pub merges_end: u32,
+    /// End of this step's entries in [`Progressive::set_wedges`].
+    pub set_end: u32,
+}
+
+impl Progressive {
+    /// Number of steps after which at most `triangles` are left; all of them if that is never so.
+    pub fn cut_at(&self, triangles: usize) -> usize {
+        if self.triangles as usize <= triangles {
+            return 0;
+        }
+        // Each step leaves no more triangles than the one before it.
+        let reached = self.steps.partition_point(|step| triangles < step.triangles as usize);
+        (reached + 1).min(self.steps.len())
+    }
+
+    /// Triangles left after the first `steps`.
+    pub fn triangles_after(&self, steps: usize) -> usize {
+        steps.checked_sub(1).map_or(self.triangles, |last| self.steps[last].triangles) as usize
+    }
+}
+
+/// Writes the sequence while it happens.
+#[derive(Debug)]
+pub struct Recorder {
+    out: Progressive,
+    layout: Layout,
+    wedge_primitive: Vec<u32>,
+    /// `1 / scale` for each column of each primitive; 0 where the primitive lacks the attribute.
+    unscale: Vec<f64>,
+    columns: usize,
+    cost_scale: f64,
+}
+
+impl Recorder {
+    /// Starts a sequence on an untouched surface.
+    pub fn new(surface: &Topology, layout: &Layout, weld: Weld) -> Self {
+        let primitives = weld.stored_start.len();
+        let mut unscale = vec![0.0; primitives * layout.columns];
+        for field in &layout.fields {
+            for (primitive, &scale) in field.scale.iter().enumerate() {
+                for c in 0..field.components {
+                    let inverse = if scale > 0.0 { 1.0 / scale } else { 0.0 };
+                    unscale[primitive * layout.columns + field.offset + c] = inverse;
+                }
+            }
+        }
+        let out = Progressive {
+            vertices: surface.positions.len() as u32,
+            wedges: surface.wedge_vertex.len() as u32,
+            columns: layout.columns as u32,
+            triangles: surface.alive as u32,
+            ..Progressive::default()
+        };
+        // Area times squared distance: the fourth power of the unit.
+        let squared = layout.radius * layout.radius;
+        let columns = layout.columns;
+        let wedge_primitive = weld.wedge_primitive;
+        Self { out, layout: layout.clone(), wedge_primitive, unscale, columns, cost_scale: squared * squared }
+    }
+
+    /// Adds a contraction that has been done, with its wedge values set.
+    pub fn record(&mut self, surface: &Topology, done: &Contraction, price: &Price) {
+        self.out.merges.extend_from_slice(&done.merged);
+        for wedge in surface.wedges(done.kept) {
+            self.out.set_wedges.push(wedge);
+            let unscale = &self.unscale[self.wedge_primitive[wedge as usize] as usize * self.columns..];
+            let values = surface.value(wedge).iter().zip(&unscale[..self.columns]);
+            self.out.set_values.extend(values.map(|(value, unscale)| (value * unscale) as f32));
+        }
+        self.out.steps.push(Step {
+            kept: done.kept,
+            gone: done.gone,
+            position: self.layout.to_object(surface.positions[done.kept as usize]),
+            t: done.t as f32,
+            cost: (price.cost * self.cost_scale) as f32,
+            error: (price.error * self.layout.radius) as f32,
+            triangles: surface.alive as u32,
+            merges_end: self.out.merges.len() as u32,
+            set_end: self.out.set_wedges.len() as u32,
+        });
+    }
+
+    /// The finished sequence.
+    pub fn finish(self) -> Progressive {
+        self.out
+    }
+}
