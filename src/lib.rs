@@ -15,6 +15,8 @@ pub mod mesh;
 pub mod metric;
 pub mod simplify;
 pub mod distance;
+pub mod allocate;
+pub mod lod;
 pub mod config;
 pub mod scan;
 pub mod gltf;

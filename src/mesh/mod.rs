@@ -3,13 +3,10 @@
 //! Knows nothing of files, scenes, materials or transforms. Values are decoded floats; each attribute remembers
 //! the storage format of its source so that a level can be written in the same one.
 
-<<<<<<< HEAD
 pub mod hash;
-=======
 pub mod layout;
 pub mod topology;
 pub mod weld;
->>>>>>> 5050857 (Simplifier: quadrics, topology, its and qem, recorded sequence, replay, distance)
 
 use serde::{Deserialize, Serialize};
 

@@ -1,0 +1,83 @@
+//! Shares one triangle budget among several recorded sequences: the cheapest contraction anywhere comes first.
+//!
+//! Pure; knows sequences only. The instanced-model papers' scene-wide queue (IAS), restated on cuts: no mesh is
+//! simplified again.
+
+use crate::simplify::progressive::Progressive;
+
+/// The cuts of several sequences, for any number of triangles in sum.
+#[derive(Debug)]
+pub struct Allocation {
+    /// `(sequence, triangles that the step saves)`, cheapest first; steps of one sequence stay in their order.
+    order: Vec<(u32, u32)>,
+    triangles: usize,
+    sequences: usize,
+}
+
+impl Allocation {
+    /// Ranks all steps of `sequences` by cost. A step costs at least as much as those before it in its sequence.
+    pub fn new(sequences: &[&Progressive]) -> Self {
+        let mut ranked: Vec<(f32, u32, u32, u32)> = Vec::new();
+        for (index, sequence) in sequences.iter().enumerate() {
+            let (mut dearest, mut before) = (0.0f32, sequence.triangles);
+            for (number, step) in sequence.steps.iter().enumerate() {
+                dearest = dearest.max(step.cost);
+                ranked.push((dearest, index as u32, number as u32, before - step.triangles));
+                before = step.triangles;
+            }
+        }
+        if 1 < sequences.len() {
+            ranked.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        }
+        Self {
+            order: ranked.into_iter().map(|(_, sequence, _, saves)| (sequence, saves)).collect(),
+            triangles: sequences.iter().map(|s| s.triangles as usize).sum(),
+            sequences: sequences.len(),
+        }
+    }
+
+    /// Number of steps to take of each sequence so that at most `triangles` are left in sum, or as near as they go.
+    pub fn cuts(&self, triangles: usize) -> Vec<usize> {
+        let mut cuts = vec![0; self.sequences];
+        let mut left = self.triangles;
+        for &(sequence, saves) in &self.order {
+            if left <= triangles {
+                break;
+            }
+            cuts[sequence as usize] += 1;
+            left -= saves as usize;
+        }
+        cuts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simplify::progressive::Step;
+
+    fn sequence(costs: &[f32]) -> Progressive {
+        let triangles = costs.len() as u32 * 2;
+        let step = |(i, &cost): (usize, &f32)| Step { cost, triangles: triangles - 2 * (i as u32 + 1), ..Step::default() };
+        Progressive { triangles, steps: costs.iter().enumerate().map(step).collect(), ..Progressive::default() }
+    }
+
+    #[test]
+    fn the_cheaper_sequence_gives_more() {
+        let (a, b) = (sequence(&[1.0, 2.0, 9.0]), sequence(&[3.0, 4.0, 5.0]));
+        let all = Allocation::new(&[&a, &b]);
+        assert_eq!(all.cuts(12), [0, 0]);
+        assert_eq!(all.cuts(8), [2, 0]);
+        assert_eq!(all.cuts(7), [2, 1]);
+        assert_eq!(all.cuts(2), [2, 3]);
+        assert_eq!(all.cuts(0), [3, 3]);
+    }
+
+    #[test]
+    fn a_cheap_step_behind_a_dear_one_waits() {
+        let (a, b) = (sequence(&[5.0, 0.0]), sequence(&[1.0, 6.0]));
+        let all = Allocation::new(&[&a, &b]);
+        assert_eq!(all.cuts(6), [0, 1]);
+        assert_eq!(all.cuts(2), [2, 1]);
+    }
+}

@@ -1,0 +1,311 @@
+//! Recorded sequences + targets → the chain of levels of one mesh, each with its measured error.
+//!
+//! Pure: knows sub-meshes and sequences, not files, nodes or caches. The budget of a level is shared among the
+//! sub-meshes of its mesh by [`crate::allocate`].
+
+use serde::{Deserialize, Serialize};
+
+use crate::allocate::Allocation;
+use crate::distance::{Surface, largest_distance};
+use crate::mesh::{Level, LevelPrimitive, LevelVertices, Mesh, Primitive};
+use crate::simplify::progressive::Progressive;
+use crate::simplify::replay::{CutPrimitive, Replay};
+
+/// How coarse a level is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Target {
+    /// Share of the mesh's triangles, 0…1.
+    Ratio(f64),
+    /// Triangles of the mesh.
+    Triangles(usize),
+    /// Largest distance from the source, as a fraction of each sub-mesh's radius.
+    ErrorOfRadius(f64),
+    /// Largest distance from the source, object space units.
+    Error(f64),
+}
+
+/// Where the vertices of a level are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Storage {
+    /// In the source's vertices if all of them are source vertices, else as [`Self::Compact`].
+    Shared,
+    /// Each level has its own.
+    Compact,
+    /// Whatever takes fewer bytes.
+    Smallest,
+}
+
+/// What decides the levels, besides the sequences.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChainSettings {
+    /// Finest first.
+    pub targets: Vec<Target>,
+    /// Where vertices are kept.
+    pub storage: Storage,
+    /// Order triangles and vertices for the caches of the GPU.
+    pub vertex_cache: bool,
+}
+
+/// One sub-mesh of the mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct Part<'a> {
+    /// The source.
+    pub mesh: &'a Mesh,
+    /// Its sequence; `None` leaves the sub-mesh as it is at every level.
+    pub sequence: Option<&'a Progressive>,
+    /// The sequence kept to source vertices ([`crate::metric::Placement::Subset`]) and the source's vertices can be
+    /// referred to.
+    pub shareable: bool,
+}
+
+/// Why a level has the triangles that it has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Stop {
+    /// The triangle count asked for.
+    Target,
+    /// The error limit asked for.
+    ErrorLimit,
+    /// No pair was left that could be contracted.
+    NoLegalPair,
+}
+
+/// The levels of one mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Chain {
+    /// Finest first. Targets that would repeat the level before them are not here.
+    pub levels: Vec<ChainLevel>,
+}
+
+/// One level of one mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChainLevel {
+    /// Number of the target, from 0.
+    pub target: usize,
+    /// One for each part; `None` = as the source.
+    pub parts: Vec<Option<Level>>,
+    /// Triangles of all parts.
+    pub triangles: usize,
+    /// Largest measured distance from the source of all parts, object space units.
+    pub error: f64,
+    /// Why it stopped there.
+    pub stop: Stop,
+}
+
+/// Cuts the chain.
+pub fn chain(parts: &[Part], settings: &ChainSettings) -> Chain {
+    let sequences: Vec<&Progressive> = parts.iter().filter_map(|p| p.sequence).collect();
+    let fixed: usize = parts.iter().filter(|p| p.sequence.is_none()).map(|p| p.mesh.triangles()).sum();
+    let source: usize = parts.iter().map(|p| p.mesh.triangles()).sum();
+    let allocation = Allocation::new(&sequences);
+    let mut cutters: Vec<Cutter> = parts.iter().filter_map(|p| Some(Cutter::new(p, p.sequence?, settings))).collect();
+    let mut chain = Chain { levels: Vec::new() };
+    let mut triangles_before = source;
+    for (number, &target) in settings.targets.iter().enumerate() {
+        let (cuts, mut stop) = match target {
+            Target::Ratio(_) | Target::Triangles(_) => {
+                let wanted = wanted(target, source);
+                let cuts = allocation.cuts(wanted.saturating_sub(fixed));
+                let left: usize = sequences.iter().zip(&cuts).map(|(s, &c)| s.triangles_after(c)).sum();
+                (cuts, if left + fixed <= wanted { Stop::Target } else { Stop::NoLegalPair })
+            }
+            Target::Error(_) | Target::ErrorOfRadius(_) => {
+                let cuts: Vec<usize> = cutters.iter().map(|cutter| cutter.cut_within(target)).collect();
+                let all = sequences.iter().zip(&cuts).all(|(s, &c)| c == s.steps.len());
+                (cuts, if all { Stop::NoLegalPair } else { Stop::ErrorLimit })
+            }
+        };
+        let (cuts, kept_one) = keep_something(&sequences, cuts, fixed);
+        if kept_one {
+            stop = Stop::NoLegalPair;
+        }
+        let left: usize = sequences.iter().zip(&cuts).map(|(s, &c)| s.triangles_after(c)).sum();
+        if triangles_before <= left + fixed {
+            continue;
+        }
+        triangles_before = left + fixed;
+        let mut levels = cutters.iter_mut().zip(&cuts).map(|(cutter, &cut)| cutter.level(cut));
+        let level_parts: Vec<Option<Level>> = parts.iter().map(|p| p.sequence.and_then(|_| levels.next())).collect();
+        let error = level_parts.iter().flatten().map(|level| level.error).fold(0.0, f64::max);
+        chain.levels.push(ChainLevel { target: number, triangles: left + fixed, parts: level_parts, error, stop });
+    }
+    chain
+}
+
+/// Triangles asked for; at least one.
+fn wanted(target: Target, source: usize) -> usize {
+    match target {
+        Target::Ratio(ratio) => ((source as f64 * ratio).round() as usize).max(1),
+        Target::Triangles(triangles) => triangles,
+        Target::Error(_) | Target::ErrorOfRadius(_) => 0,
+    }
+}
+
+/// A level that shows nothing is no level: steps back in the last sequence that still had triangles.
+fn keep_something(sequences: &[&Progressive], mut cuts: Vec<usize>, fixed: usize) -> (Vec<usize>, bool) {
+    let left = |cuts: &[usize]| -> usize { sequences.iter().zip(cuts).map(|(s, &c)| s.triangles_after(c)).sum() };
+    if 0 < fixed || 0 < left(&cuts) {
+        return (cuts, false);
+    }
+    // The part whose last step cost most is the one to keep.
+    let cost = |s: &Progressive| s.steps.iter().map(|step| step.cost).fold(0.0, f32::max);
+    let Some(at) = (0..sequences.len()).max_by(|&a, &b| cost(sequences[a]).total_cmp(&cost(sequences[b]))) else {
+        return (cuts, false);
+    };
+    while 0 < cuts[at] && left(&cuts) == 0 {
+        cuts[at] -= 1;
+    }
+    (cuts, true)
+}
+
+/// One sub-mesh on its way down.
+struct Cutter<'a> {
+    part: Part<'a>,
+    sequence: &'a Progressive,
+    settings: &'a ChainSettings,
+    replay: Replay<'a>,
+    done: usize,
+    source: Surface,
+    radius: f64,
+}
+
+impl<'a> Cutter<'a> {
+    fn new(part: &Part<'a>, sequence: &'a Progressive, settings: &'a ChainSettings) -> Self {
+        let triangles = part.mesh.primitives.iter().flat_map(|p| {
+            let positions = p.positions();
+            p.indices.chunks_exact(3).map(move |t| [0, 1, 2].map(|i| positions[t[i] as usize].map(f64::from)))
+        });
+        Self {
+            part: *part,
+            sequence,
+            settings,
+            replay: Replay::new(part.mesh, sequence),
+            done: 0,
+            source: Surface::new(triangles.collect()),
+            radius: crate::mesh::layout::frame(part.mesh).1,
+        }
+    }
+
+    /// The coarsest cut whose measured error is within the limit: the error grows, though not strictly, so a search by
+    /// halves finds a cut whose successor (at the search's resolution) is over it.
+    fn cut_within(&self, target: Target) -> usize {
+        let limit = match target {
+            Target::ErrorOfRadius(fraction) => fraction * self.radius,
+            Target::Error(limit) => limit,
+            Target::Ratio(_) | Target::Triangles(_) => return 0,
+        };
+        let (mut within, mut over) = (0, self.sequence.steps.len() + 1);
+        // Below this many steps a finer answer is not worth another measurement.
+        let resolution = (self.sequence.steps.len() / 1000).max(1);
+        while resolution < over - within {
+            let middle = within + (over - within) / 2;
+            let mut replay = Replay::new(self.part.mesh, self.sequence);
+            replay.advance(middle.min(self.sequence.steps.len()));
+            let cut = replay.primitives();
+            let error = if cut.iter().all(|c| c.indices.is_empty()) { f64::INFINITY } else { self.error(&mut replay, &cut) };
+            if error <= limit {
+                within = middle;
+            } else {
+                over = middle;
+            }
+        }
+        within.min(self.sequence.steps.len())
+    }
+
+    fn level(&mut self, cut: usize) -> Level {
+        if cut < self.done {
+            // A later target asked for a finer cut of this part: start again.
+            self.replay = Replay::new(self.part.mesh, self.sequence);
+        }
+        self.done = cut;
+        self.replay.advance(cut);
+        let cuts = self.replay.primitives();
+        let sources = &self.part.mesh.primitives;
+        let error = measured(&self.source, self.part.mesh, &mut self.replay, &cuts);
+        let primitives =
+            cuts.into_iter().enumerate().map(|(index, cut)| self.primitive(index, &sources[index], cut)).collect();
+        Level { primitives, error }
+    }
+
+    fn error(&self, replay: &mut Replay, cuts: &[CutPrimitive]) -> f64 {
+        measured(&self.source, self.part.mesh, replay, cuts)
+    }
+
+    fn primitive(&self, index: usize, source: &Primitive, mut cut: CutPrimitive) -> LevelPrimitive {
+        if cut.indices.is_empty() {
+            return LevelPrimitive { indices: Vec::new(), vertices: LevelVertices::Source };
+        }
+        let count = cut.wedges.len();
+        if self.settings.vertex_cache {
+            cut.indices = meshopt::optimize_vertex_cache(&cut.indices, count);
+        }
+        if self.part.shareable && self.shares(source, &cut) {
+            let indices = cut.indices.iter().map(|&i| self.replay.origin(cut.wedges[i as usize])).collect();
+            return LevelPrimitive { indices, vertices: LevelVertices::Source };
+        }
+        if self.settings.vertex_cache {
+            order_by_use(&mut cut);
+        }
+        let vertices = self.replay.vertices(index, &cut);
+        LevelPrimitive { indices: cut.indices, vertices: LevelVertices::Own(vertices) }
+    }
+
+    fn shares(&self, source: &Primitive, cut: &CutPrimitive) -> bool {
+        let index_size = |vertices: usize| if vertices < usize::from(u16::MAX) { 2 } else { 4 };
+        let vertex_size = |components: usize, size: usize| (components * size).next_multiple_of(4);
+        let sets = source.targets.iter().flatten().chain(&source.attributes);
+        let stride: usize = sets.map(|a| vertex_size(a.components, a.format.component.size())).sum();
+        let shared = cut.indices.len() * index_size(source.count);
+        let compact = cut.indices.len() * index_size(cut.wedges.len()) + cut.wedges.len() * stride;
+        match self.settings.storage {
+            Storage::Shared => true,
+            Storage::Compact => false,
+            Storage::Smallest => shared <= compact,
+        }
+    }
+}
+
+/// Numbers vertices by first use, so that a GPU fetches them in order.
+fn order_by_use(cut: &mut CutPrimitive) {
+    let mut order = vec![u32::MAX; cut.wedges.len()];
+    let mut wedges = Vec::with_capacity(cut.wedges.len());
+    for index in &mut cut.indices {
+        let at = &mut order[*index as usize];
+        if *at == u32::MAX {
+            *at = wedges.len() as u32;
+            wedges.push(cut.wedges[*index as usize]);
+        }
+        *index = *at;
+    }
+    cut.wedges = wedges;
+}
+
+/// Points measured in each direction: beyond this many a further one hardly ever raises the maximum.
+const MOST_SAMPLES: usize = 16384;
+
+/// Largest distance between source and level: from source vertices to the level, and from the level's corners and
+/// middles of triangles to the source.
+fn measured(source: &Surface, mesh: &Mesh, replay: &mut Replay, cuts: &[CutPrimitive]) -> f64 {
+    let corners = |cut: &CutPrimitive, t: &[u32]| {
+        [0, 1, 2].map(|i| replay.wedge_position(cut.wedges[t[i] as usize]).map(f64::from))
+    };
+    let triangles: Vec<[[f64; 3]; 3]> =
+        cuts.iter().flat_map(|cut| cut.indices.chunks_exact(3).map(move |t| corners(cut, t))).collect();
+    let middles = triangles.iter().map(|t| [0, 1, 2].map(|i| (t[0][i] + t[1][i] + t[2][i]) / 3.0));
+    let points = middles.chain(triangles.iter().map(|t| t[0]));
+    let back = largest_distance(thinned(points, triangles.len() * 2), source, 0.0);
+    let level = Surface::new(triangles.clone());
+    let total = mesh.vertices();
+    let vertices = mesh.primitives.iter().flat_map(used_positions);
+    largest_distance(thinned(vertices, total), &level, back)
+}
+
+fn used_positions(primitive: &Primitive) -> impl Iterator<Item = [f64; 3]> + '_ {
+    let mut used = vec![false; primitive.count];
+    primitive.indices.iter().for_each(|&i| used[i as usize] = true);
+    let positions = primitive.positions();
+    used.into_iter().zip(positions).filter_map(|(used, p)| used.then(|| p.map(f64::from)))
+}
+
+fn thinned(points: impl Iterator<Item = [f64; 3]>, count: usize) -> impl Iterator<Item = [f64; 3]> {
+    points.step_by(count.div_ceil(MOST_SAMPLES).max(1))
+}
