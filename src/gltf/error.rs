@@ -1,6 +1,7 @@
-//! What can be wrong with a glTF document, and where. Knows no paths of files and prints nothing.
+//! What can be wrong with a scene, and where. Prints nothing.
 
 use std::fmt::Display;
+use std::path::{Path, PathBuf};
 
 /// A fault at one place of a document: `meshes[2].primitives[0]: index 812 is out of range (640 vertices)`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -137,5 +138,54 @@ impl DocumentError {
 
     fn prefix(place: &str) -> String {
         if place.is_empty() { String::new() } else { format!("{place}: ") }
+    }
+}
+
+/// A scene could not be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("failed to read `{}`: {cause}", path.display())]
+pub struct ReadError {
+    /// The scene's file, as given by the caller.
+    pub path: PathBuf,
+    /// Why.
+    pub cause: ReadCause,
+}
+
+/// Why a scene could not be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ReadCause {
+    /// The file itself could not be opened, in the operating system's words.
+    #[error("{0}")]
+    File(String),
+    /// Its content is at fault.
+    #[error(transparent)]
+    Document(#[from] DocumentError),
+    /// An OBJ file is at fault.
+    #[error("{0}")]
+    Obj(String),
+}
+
+impl ReadError {
+    /// The file could not be opened.
+    pub fn io(path: &Path, error: &std::io::Error) -> Self {
+        let words = match error.kind() {
+            std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
+            _ => error.to_string(),
+        };
+        Self { path: path.to_owned(), cause: ReadCause::File(words) }
+    }
+
+    /// Its content is at fault.
+    pub fn document(path: &Path, fault: DocumentError) -> Self {
+        Self { path: path.to_owned(), cause: ReadCause::Document(fault) }
+    }
+
+    /// What a user can do about it, where that is known.
+    pub fn hint(&self) -> Option<&'static str> {
+        match &self.cause {
+            ReadCause::File(_) => None,
+            ReadCause::Document(fault) => fault.hint(),
+            ReadCause::Obj(_) => Some("export the scene again, or as glTF"),
+        }
     }
 }

@@ -6,6 +6,8 @@ use super::buffers::Buffers;
 use super::dependencies::Dependency;
 use super::document::Document;
 use crate::mesh::Primitive;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 /// Everything a later stage may ask of one source file.
 #[derive(Debug)]
@@ -31,6 +33,9 @@ pub struct SourceMesh {
     pub name: Option<String>,
     /// One for each entry of `primitives`, in order.
     pub primitives: Vec<SourcePrimitive>,
+    /// For primitives that kept only a part of their accessors' vertices (because their triangles use fewer than
+    /// half): which vertex of the source each vertex was. By index in `primitives`.
+    pub vertex_maps: BTreeMap<usize, Vec<u32>>,
 }
 
 impl SourceMesh {
@@ -40,6 +45,14 @@ impl SourceMesh {
             SourcePrimitive::Triangles(primitive) => Some((i, primitive)),
             SourcePrimitive::PassThrough { .. } => None,
         })
+    }
+
+    /// Indices into the vertices of a primitive, as indices into the vertices of its accessors.
+    pub fn source_indices<'a>(&self, primitive: usize, indices: &'a [u32]) -> Cow<'a, [u32]> {
+        match self.vertex_maps.get(&primitive) {
+            None => Cow::Borrowed(indices),
+            Some(map) => indices.iter().map(|&i| map[i as usize]).collect(),
+        }
     }
 
     /// Triangles of all primitives that have levels.
