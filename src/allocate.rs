@@ -58,7 +58,8 @@ mod tests {
 
     fn sequence(costs: &[f32]) -> Progressive {
         let triangles = costs.len() as u32 * 2;
-        let step = |(i, &cost): (usize, &f32)| Step { cost, triangles: triangles - 2 * (i as u32 + 1), ..Step::default() };
+        let step =
+            |(i, &cost): (usize, &f32)| Step { cost, triangles: triangles - 2 * (i as u32 + 1), ..Step::default() };
         Progressive { triangles, steps: costs.iter().enumerate().map(step).collect(), ..Progressive::default() }
     }
 

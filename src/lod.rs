@@ -201,7 +201,8 @@ impl<'a> Cutter<'a> {
             let mut replay = Replay::new(self.part.mesh, self.sequence);
             replay.advance(middle.min(self.sequence.steps.len()));
             let cut = replay.primitives();
-            let error = if cut.iter().all(|c| c.indices.is_empty()) { f64::INFINITY } else { self.error(&mut replay, &cut) };
+            let error =
+                if cut.iter().all(|c| c.indices.is_empty()) { f64::INFINITY } else { self.error(&mut replay, &cut) };
             if error <= limit {
                 within = middle;
             } else {

@@ -112,15 +112,16 @@ impl Reporter for Lines {
         match event {
             Event::ScanFinished { files } => {
                 self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner).files.total = *files;
-                self.tell(Verbosity::Verbose, &format!("found {} scene files", count(*files)));
+                self.tell(Verbosity::Verbose, &format!("found {}", plural(*files, "scene")));
             }
             Event::PlanFinished { found, distinct, jobs, triangles } => {
                 self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner).jobs.total = *jobs;
                 if *jobs > 0 {
-                    let (found, distinct, triangles) = (count(*found), count(*distinct), count(*triangles));
+                    let (found, distinct, triangles) =
+                        (plural(*found, "mesh"), count(*distinct), plural(*triangles, "triangle"));
                     self.tell(
                         Verbosity::Normal,
-                        &format!("{found} meshes, {distinct} distinct: {jobs} to bake, {triangles} triangles"),
+                        &format!("{found}, {distinct} distinct: {} to bake, {triangles}", count(*jobs)),
                     );
                 }
             }
@@ -130,10 +131,10 @@ impl Reporter for Lines {
             }
             Event::SceneStarted { .. } => {}
             Event::SceneRead { path, meshes, .. } => {
-                self.tell(Verbosity::Verbose, &format!("read {path}: {} meshes", count(*meshes)));
+                self.tell(Verbosity::Verbose, &format!("read {path}: {}", plural(*meshes, "mesh")));
             }
             Event::JobStarted { mesh, triangles } => {
-                self.tell(Verbosity::Verbose, &format!("baking {mesh}: {} triangles", count(*triangles)));
+                self.tell(Verbosity::Verbose, &format!("baking {mesh}: {}", plural(*triangles, "triangle")));
             }
             Event::JobFinished { mesh, cached, .. } => {
                 let how = if *cached { "from the cache" } else { "baked" };
@@ -141,7 +142,7 @@ impl Reporter for Lines {
                 self.step("meshes", |tally| &mut tally.jobs);
             }
             Event::ScenePlanned { path, reason, jobs } => {
-                self.tell(Verbosity::Normal, &format!("would bake {path}: {reason} ({} jobs)", count(*jobs)));
+                self.tell(Verbosity::Normal, &format!("would bake {path}: {reason} ({})", plural(*jobs, "job")));
             }
             Event::SceneWritten { path, changed, .. } => {
                 let how = if *changed { "wrote" } else { "left untouched" };

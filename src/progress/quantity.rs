@@ -58,9 +58,14 @@ pub fn duration(time: Duration) -> String {
     }
 }
 
-/// `1 scene`, `12 scenes`, `1,200 scenes`; the plural is the word with an `s`.
+/// `1 scene`, `12 scenes`, `1,200 meshes`.
 pub fn plural(number: u64, word: &str) -> String {
-    format!("{} {word}{}", count(number), if number == 1 { "" } else { "s" })
+    let ending = match number {
+        1 => "",
+        _ if word.ends_with("sh") => "es",
+        _ => "s",
+    };
+    format!("{} {word}{ending}", count(number))
 }
 
 #[cfg(test)]
@@ -70,6 +75,12 @@ mod tests {
     #[test]
     fn counts() {
         assert_eq!([0, 999, 1000, 1234567].map(count), ["0", "999", "1,000", "1,234,567"]);
+    }
+
+    #[test]
+    fn plurals() {
+        assert_eq!([0, 1, 2].map(|n| plural(n, "mesh")), ["0 meshes", "1 mesh", "2 meshes"]);
+        assert_eq!(plural(1200, "scene"), "1,200 scenes");
     }
 
     #[test]

@@ -32,6 +32,8 @@ struct State {
     phase: Phase,
     meshes: u64,
     meshes_done: u64,
+    /// Scenes that are through, unchanged or failed, while others are still read.
+    scenes_done: u64,
     running: Vec<(String, u64)>,
     failed: Vec<String>,
 }
@@ -71,13 +73,15 @@ impl Terminal {
     }
 
     fn planned(&self, jobs: u64, triangles: u64) {
-        {
+        let scenes_done = {
             let mut state = self.state();
             state.phase = Phase::Writing;
             state.meshes = jobs;
-        }
+            state.scenes_done
+        };
         self.files.set_prefix("scenes");
-        self.files.set_position(0);
+        self.files.set_position(scenes_done);
+        self.files.set_message("");
         if jobs > 0 {
             self.jobs.set_length(triangles);
             self.bars.add(self.jobs.clone());
@@ -118,6 +122,7 @@ impl Terminal {
     }
 
     fn scene_done(&self) {
+        self.state().scenes_done += 1;
         self.files.inc(1);
     }
 
@@ -147,9 +152,9 @@ impl Reporter for Terminal {
             }
             Event::SceneStarted { path } => self.files.set_message(path.clone()),
             Event::SceneRead { path, meshes, .. } => {
-                self.detail(&format!("read {path}: {}", plural(*meshes, "mesh piece")));
+                self.detail(&format!("read {path}: {}", plural(*meshes, "mesh")));
                 if self.state().phase == Phase::Reading {
-                    self.scene_done();
+                    self.files.inc(1); // read, not done: the bar starts again when all is read
                 }
             }
             Event::SceneUnchanged { path } => {
@@ -196,11 +201,16 @@ fn jobs_style() -> ProgressStyle {
         .progress_chars("━╸ ")
 }
 
-/// `1.2 M triangles/s, 12.0 s left`, once there is something to go by.
+/// Whole seconds: an estimate is no better than that.
+fn remaining(time: Duration) -> String {
+    if time < Duration::from_secs(60) { format!("{:.0} s", time.as_secs_f64().ceil()) } else { duration(time) }
+}
+
+/// `1.2 M triangles/s, 12 s left`, once there is something to go by.
 fn write_rate(state: &ProgressState, to: &mut dyn fmt::Write) {
     if state.pos() == 0 || state.elapsed() < RATE_AFTER {
         return;
     }
-    let written = write!(to, "{} triangles/s, {} left", short(state.per_sec()), duration(state.eta()));
+    let written = write!(to, "{} triangles/s, {} left", short(state.per_sec()), remaining(state.eta()));
     written.expect("a line in memory can be written");
 }

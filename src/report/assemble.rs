@@ -40,8 +40,8 @@ fn distinct(scenes: &[SceneRecord]) -> Vec<DistinctMesh> {
 fn totals(scenes: &[SceneRecord], distinct: usize) -> Totals {
     let with = |status| scenes.iter().filter(|scene| scene.status == status).count() as u64;
     let meshes = || scenes.iter().flat_map(|scene| &scene.meshes);
-    let levels = meshes().map(|mesh| mesh.levels.len()).max().unwrap_or(0);
-    let at = |level, weight: fn(&MeshRecord) -> u64| meshes().map(|m| triangles_at(m, level) * weight(m)).sum();
+    let targets = meshes().flat_map(|mesh| &mesh.levels).map(|level| level.number).max().unwrap_or(0);
+    let at = |number, weight: fn(&MeshRecord) -> u64| meshes().map(|m| triangles_at(m, number) * weight(m)).sum();
     Totals {
         files: scenes.len() as u64,
         baked: with(Status::Baked),
@@ -51,15 +51,14 @@ fn totals(scenes: &[SceneRecord], distinct: usize) -> Totals {
         meshes_found: meshes().map(|mesh| mesh.pieces.len() as u64).sum(),
         meshes_distinct: distinct as u64,
         instances: meshes().map(|mesh| mesh.instances).sum(),
-        triangles_drawn: (0..=levels).map(|level| at(level, |mesh| mesh.instances)).collect(),
-        triangles_stored: (0..=levels).map(|level| at(level, |_| 1)).collect(),
+        triangles_drawn: (0..=targets).map(|number| at(number, |mesh| mesh.instances)).collect(),
+        triangles_stored: (0..=targets).map(|number| at(number, |_| 1)).collect(),
         bytes_in: scenes.iter().map(|scene| scene.bytes_in).sum(),
         bytes_out: scenes.iter().map(|scene| scene.bytes_out).sum(),
     }
 }
 
-/// Triangles of a mesh at a level; a mesh with fewer levels shows its last one. Level 0 is the source.
-fn triangles_at(mesh: &MeshRecord, level: usize) -> u64 {
-    let level = level.min(mesh.levels.len());
-    if level == 0 { mesh.triangles } else { mesh.levels[level - 1].triangles }
+/// Triangles of a mesh as shown for a target; 0 is the source.
+fn triangles_at(mesh: &MeshRecord, number: u64) -> u64 {
+    mesh.level_for(number).map_or(mesh.triangles, |level| level.triangles)
 }

@@ -58,8 +58,8 @@ pub struct Totals {
     pub meshes_distinct: u64,
     /// Nodes with a mesh in all scenes.
     pub instances: u64,
-    /// Triangles drawn when every instance shows level `k`; `[0]` is the source. An instance with fewer levels shows
-    /// its last one.
+    /// Triangles drawn when every instance shows its level for the target `k`; `[0]` is the source. An instance
+    /// without a level for that target shows the one before.
     pub triangles_drawn: Vec<u64>,
     /// The same with every mesh of a file counted once, however many nodes show it.
     pub triangles_stored: Vec<u64>,
@@ -159,13 +159,13 @@ pub struct PieceLevel {
     pub triangles: u64,
     /// Largest distance between the surfaces of source and level, in units of the mesh's own space.
     pub error: f64,
-    /// Why it is not coarser.
-    pub stop: Stop,
 }
 
 /// One level of a mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LevelRecord {
+    /// Number of the target, from 1. A target that would repeat the level before it has no level.
+    pub number: u64,
     /// What was asked for.
     pub target: LevelTarget,
     /// Triangles of all pieces.
@@ -182,7 +182,7 @@ pub struct LevelRecord {
     pub coverage: f64,
     /// Distance from which the level may be shown, in units of the mesh's own space.
     pub distance: f64,
-    /// Why it is not coarser: of several pieces, the first reason that is not `target`.
+    /// Why it is not coarser.
     pub stop: Stop,
 }
 
@@ -190,12 +190,29 @@ pub struct LevelRecord {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Stop {
-    /// The target was reached.
+    /// The number of triangles asked for.
     Target,
-    /// Going on would have passed the error limit.
+    /// The error limit asked for.
     ErrorLimit,
     /// No edge was left that may be contracted.
     NoLegalPair,
+}
+
+impl From<crate::lod::Stop> for Stop {
+    fn from(stop: crate::lod::Stop) -> Self {
+        match stop {
+            crate::lod::Stop::Target => Self::Target,
+            crate::lod::Stop::ErrorLimit => Self::ErrorLimit,
+            crate::lod::Stop::NoLegalPair => Self::NoLegalPair,
+        }
+    }
+}
+
+impl MeshRecord {
+    /// What is shown for a target (from 1): its level, or the level before if it has none; `None` is the source.
+    pub fn level_for(&self, number: u64) -> Option<&LevelRecord> {
+        self.levels.iter().take_while(|level| level.number <= number).last()
+    }
 }
 
 /// One distinct sub-mesh of all scenes.

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
-use super::{MeshRecord, Report, Stop};
+use super::{LevelRecord, MeshRecord, Report, Stop};
 use crate::config::{ErrorUnit, LevelTarget};
 use crate::progress::Summary;
 use crate::progress::quantity::{bytes, count, duration, plural};
@@ -104,7 +104,7 @@ fn levels(report: &Report) -> Option<String> {
             count(stored[level]),
             percent(share),
             count(drawn[level]),
-            level.checked_sub(1).map(|k| percent(worst_error(report, k))).unwrap_or_default(),
+            if level == 0 { String::new() } else { percent(worst_error(report, level as u64)) },
         ]
     });
     let header = ["", "asked", "triangles", "of source", "drawn", "worst error"];
@@ -135,24 +135,17 @@ fn meshes(report: &Report) -> impl Iterator<Item = &MeshRecord> {
     report.scenes.iter().flat_map(|scene| &scene.meshes)
 }
 
-fn worst_error(report: &Report, level: usize) -> f64 {
-    meshes(report).filter_map(|mesh| mesh.levels.get(level)).map(|level| level.error_of_radius).fold(0.0, f64::max)
+fn worst_error(report: &Report, number: u64) -> f64 {
+    meshes(report).filter_map(|mesh| mesh.level_for(number)).map(|level| level.error_of_radius).fold(0.0, f64::max)
 }
 
-/// How many levels stopped before their target, and why.
+/// How many levels have more triangles than asked for. An error limit is no such promise: `None` for those.
 fn missed(report: &Report) -> Option<String> {
-    let stops = || meshes(report).flat_map(|mesh| &mesh.levels).map(|level| level.stop);
-    let with = |stop| stops().filter(|s| *s == stop).count() as u64;
-    let (limit, no_pair) = (with(Stop::ErrorLimit), with(Stop::NoLegalPair));
-    if limit + no_pair == 0 {
-        return None;
-    }
-    let title =
-        format!("{} of {} stopped before the target:", count(limit + no_pair), plural(stops().count() as u64, "level"));
-    let reasons = [(limit, "at the error limit"), (no_pair, "with nothing left to contract")];
-    let told =
-        reasons.iter().filter(|(number, _)| *number > 0).map(|(number, why)| format!("{} {why}", count(*number)));
-    Some(std::iter::once(title).chain(told).collect::<Vec<_>>().join("\n  "))
+    let counted = |level: &&LevelRecord| !matches!(level.target, LevelTarget::Error { .. });
+    let levels = || meshes(report).flat_map(|mesh| &mesh.levels).filter(counted);
+    let missed = levels().filter(|level| level.stop != Stop::Target).count() as u64;
+    let all = plural(levels().count() as u64, "level");
+    (missed > 0).then(|| format!("{} of {all} have more triangles than asked: nothing left to contract", count(missed)))
 }
 
 /// Columns two spaces apart, those in `right` to the right; no rules, no trailing spaces.

@@ -9,8 +9,9 @@ fn hash(byte: u8) -> MeshHash {
     MeshHash([byte; 32])
 }
 
-fn level(triangles: u64, stop: Stop) -> LevelRecord {
+fn level(number: u64, triangles: u64, stop: Stop) -> LevelRecord {
     LevelRecord {
+        number,
         target: LevelTarget::Ratio(0.5),
         triangles,
         vertices: triangles / 2,
@@ -30,7 +31,7 @@ fn mesh(hashes: &[u8], instances: u64, levels: &[u64]) -> MeshRecord {
         primitives: vec![0],
         triangles: 1000,
         vertices: 600,
-        levels: levels.iter().map(|&t| PieceLevel { triangles: t, error: 0.02, stop: Stop::Target }).collect(),
+        levels: levels.iter().map(|&t| PieceLevel { triangles: t, error: 0.02 }).collect(),
     };
     MeshRecord {
         index: 0,
@@ -40,7 +41,7 @@ fn mesh(hashes: &[u8], instances: u64, levels: &[u64]) -> MeshRecord {
         vertices: 600 * hashes.len() as u64,
         radius: 2.0,
         pieces: hashes.iter().map(piece).collect(),
-        levels: levels.iter().map(|&t| level(t, Stop::Target)).collect(),
+        levels: levels.iter().zip(1..).map(|(&t, number)| level(number, t, Stop::Target)).collect(),
         notes: vec![],
     }
 }
@@ -88,7 +89,7 @@ fn summary() -> Summary {
 }
 
 #[test]
-fn sums_count_instances_and_the_last_level_of_short_chains() {
+fn sums_count_instances_and_the_level_before_where_there_is_none() {
     let report = report();
     let paths: Vec<&str> = report.scenes.iter().map(|s| s.path.as_str()).collect();
     assert_eq!(paths, ["a.glb", "b.glb", "c.glb"]);
@@ -175,14 +176,24 @@ fn the_summary_fits_a_terminal() {
 }
 
 #[test]
-fn the_summary_says_which_targets_were_missed() {
-    let mut scene = scene("a.glb", Status::Baked, vec![mesh(&[1], 1, &[500, 400, 400])]);
-    scene.meshes[0].levels[1].stop = Stop::ErrorLimit;
-    scene.meshes[0].levels[2].stop = Stop::NoLegalPair;
+fn a_target_without_a_level_shows_the_one_before() {
+    let mut mesh = mesh(&[1], 1, &[500, 250]);
+    mesh.levels[1].number = 3;
+    let shown: Vec<_> = (0..5).map(|k| mesh.level_for(k).map(|level| level.triangles)).collect();
+    assert_eq!(shown, [None, Some(500), Some(500), Some(250), Some(250)]);
+    let report = Report::new(SceneSettings::default(), vec![scene("a.glb", Status::Baked, vec![mesh])], vec![]);
+    assert_eq!(report.totals.triangles_drawn, [1000, 500, 500, 250]);
+}
+
+#[test]
+fn the_summary_says_how_many_targets_were_missed() {
+    let mut scene = scene("a.glb", Status::Baked, vec![mesh(&[1], 1, &[500, 400, 390])]);
+    scene.meshes[0].levels[1].stop = Stop::NoLegalPair;
+    scene.meshes[0].levels[2].stop = Stop::ErrorLimit;
+    scene.meshes[0].levels[2].target = LevelTarget::Error { limit: 0.1, unit: crate::config::ErrorUnit::Object };
     let report = Report::new(SceneSettings::default(), vec![scene], vec![]);
     let text = summary_table(&report, &summary(), Duration::ZERO);
-    let last = "2 of 3 levels stopped before the target:\n  1 at the error limit\n  1 with nothing left to contract";
-    assert!(text.ends_with(last), "{text}");
+    assert!(text.ends_with("\n1 of 2 levels have more triangles than asked: nothing left to contract"), "{text}");
 }
 
 #[test]

@@ -311,7 +311,8 @@ impl Passive {
             let mut own = Vec::new();
             let mut offset = 0;
             let base = primitive.attributes.iter().filter(|a| is_blended(a, fields)).map(|a| (None, a));
-            let targets = primitive.targets.iter().enumerate().flat_map(|(t, set)| set.iter().map(move |a| (Some(t), a)));
+            let targets =
+                primitive.targets.iter().enumerate().flat_map(|(t, set)| set.iter().map(move |a| (Some(t), a)));
             for (target, a) in base.chain(targets) {
                 own.push(BlendColumn { target, name: a.name.clone(), offset, components: a.components });
                 offset += a.components;
@@ -368,7 +369,8 @@ impl Passive {
             self.write_blend(column, cut, to);
             return;
         }
-        let set = influence_sets(primitive).find(|(joints, weights)| joints.name == source.name || weights.name == source.name);
+        let set = influence_sets(primitive)
+            .find(|(joints, weights)| joints.name == source.name || weights.name == source.name);
         if let Some((joints, weights)) = set {
             let number: usize = joints.name["JOINTS_".len()..].parse().unwrap_or(0);
             let want_weights = weights.name == source.name;
