@@ -20,6 +20,8 @@ pub mod lod;
 pub mod config;
 pub mod scan;
 pub mod gltf;
+pub mod obj;
+pub mod identify;
 pub mod key;
 pub mod progress;
 pub mod report;

@@ -163,12 +163,11 @@ impl<'a> Accessor<'a> {
         if !count_is_known {
             self.verify(views)?;
         }
-        let mut bytes = match self.run(views)? {
-            Some((view, run)) => gather(view, run, &self.place)?,
-            None => {
-                let size = self.layout.components() * self.layout.component.size();
-                Cow::Owned(vec![0; self.count as usize * size])
-            }
+        let mut bytes = if let Some((view, run)) = self.run(views)? {
+            gather(view, run, &self.place)?
+        } else {
+            let size = self.layout.components() * self.layout.component.size();
+            Cow::Owned(vec![0; self.count as usize * size])
         };
         if let Some(sparse) = json::child(self.value, "sparse", &self.place)? {
             self.put_sparse(sparse, views, bytes.to_mut())?;
@@ -311,7 +310,9 @@ fn floats(bytes: &[u8]) -> Vec<f32> {
     let whole = values.len() * 4;
     bytemuck::cast_slice_mut::<f32, u8>(&mut values).copy_from_slice(&bytes[..whole]);
     if cfg!(target_endian = "big") {
-        values.iter_mut().for_each(|v| *v = f32::from_bits(v.to_bits().swap_bytes()));
+        for value in &mut values {
+            *value = f32::from_bits(value.to_bits().swap_bytes());
+        }
     }
     values
 }
@@ -338,7 +339,7 @@ mod tests {
     use std::sync::Arc;
 
     /// A document whose only buffer holds `bytes`, with one buffer view over all of them.
-    fn scene(bytes: &[u8], view: Value, accessor: Value) -> (Document, Buffers) {
+    fn scene(bytes: &[u8], view: &Value, accessor: &Value) -> (Document, Buffers) {
         let mut document = Document::new(Container::Glb, "test");
         document.json["buffers"] = json!([{ "byteLength": bytes.len() }]);
         document.json["bufferViews"] = json!([{ "buffer": 0, "byteLength": bytes.len() }, view]);
@@ -349,7 +350,7 @@ mod tests {
     }
 
     fn numbers(bytes: &[u8], view: Value, accessor: Value) -> Result<Vec<f32>, String> {
-        let (document, buffers) = scene(bytes, view, accessor);
+        let (document, buffers) = scene(bytes, &view, &accessor);
         let views = Views::new(&document, &buffers).unwrap();
         let numbers = Accessor::parse(&document, 0, "here").and_then(|a| a.numbers(&views, None));
         numbers.map(|n| n.values).map_err(|e| e.to_string())
@@ -452,7 +453,7 @@ mod tests {
         let mut far = accessor(5121, "SCALAR", 1);
         far["bufferView"] = json!(9);
         assert_eq!(failure(far), "accessors[0]: buffer view 9 does not exist (there are 2)");
-        let (document, buffers) = scene(&[0; 12], json!({}), accessor(5126, "SCALAR", 3));
+        let (document, buffers) = scene(&[0; 12], &json!({}), &accessor(5126, "SCALAR", 3));
         let views = Views::new(&document, &buffers).unwrap();
         let parsed = Accessor::parse(&document, 0, "here").unwrap();
         assert!(parsed.indices(&views).is_err());
@@ -466,7 +467,7 @@ mod tests {
     fn indices_of_every_width() {
         for (component, expected) in [(5121, vec![1, 0, 2, 0]), (5123, vec![1, 2]), (5125, vec![131_073])] {
             let (document, buffers) =
-                scene(&[1, 0, 2, 0], json!({}), accessor(component, "SCALAR", expected.len() as u64));
+                scene(&[1, 0, 2, 0], &json!({}), &accessor(component, "SCALAR", expected.len() as u64));
             let views = Views::new(&document, &buffers).unwrap();
             assert_eq!(Accessor::parse(&document, 0, "").unwrap().indices(&views).unwrap(), expected);
         }

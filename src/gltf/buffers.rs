@@ -3,6 +3,7 @@
 //! Knows nothing of what the bytes mean. A buffer without any data is no fault here (compressed scenes declare such
 //! fallbacks); whoever needs its bytes gets an error.
 
+use super::decode::meshopt::EXTENSIONS;
 use super::document::{Container, Document};
 use super::error::{DocumentError, Problem};
 use super::{json, uri};
@@ -45,7 +46,7 @@ impl Buffers {
             let place = format!("buffers[{i}]");
             let data = match json::string(buffer, "uri", &place)? {
                 Some(address) => Some(load_address(address, base, &place, &mut files)?),
-                None if i == 0 && document.container == Container::Glb => document.bin.clone().map(Blob::Chunk),
+                None if i == 0 && document.container == Container::Glb => bin_chunk(document, buffer, &place)?,
                 None => None,
             };
             slots.push(checked_slot(buffer, data, &place)?);
@@ -80,9 +81,7 @@ impl Buffers {
             let problem = Problem::Unresolved { kind: "buffer", index: index as u64, count };
             return Err(DocumentError::new(place, problem));
         }
-        let bytes = self
-            .bytes(index)
-            .ok_or_else(|| DocumentError::invalid(&place, format!("buffer {index} has neither an address nor data")))?;
+        let bytes = self.bytes(index).ok_or_else(|| DocumentError::new(&place, Problem::NoData { buffer: index }))?;
         let end = offset.checked_add(length).filter(|&end| end <= bytes.len() as u64);
         let Some(end) = end else {
             return Err(DocumentError::new(
@@ -97,6 +96,16 @@ impl Buffers {
         };
         Ok(&bytes[offset as usize..end as usize])
     }
+}
+
+/// The first buffer of a GLB is its BIN chunk, unless it stands for data that only exists compressed.
+fn bin_chunk(document: &Document, buffer: &Value, place: &str) -> Result<Option<Blob>, DocumentError> {
+    let bin = document.bin.clone().map(Blob::Chunk);
+    let is_fallback = EXTENSIONS.iter().any(|name| json::extension(buffer, name).is_some());
+    if bin.is_none() && !is_fallback {
+        return Err(DocumentError::new(place, Problem::Glb("there is no BIN chunk for this buffer".to_owned())));
+    }
+    Ok(bin)
 }
 
 fn load_address(

@@ -15,6 +15,8 @@ pub enum DependencyKind {
     Image,
     /// Something an extension or `extras` names; it need not exist.
     Other,
+    /// Read while the scene was, and all of it is in the document now (materials of an OBJ file).
+    Source,
 }
 
 /// A file beside the scene.

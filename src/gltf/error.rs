@@ -105,6 +105,12 @@ pub enum Problem {
         /// `NaN`, `inf` or `-inf`.
         value: String,
     },
+    /// A buffer whose bytes are needed has none.
+    #[error("buffer {buffer} has neither an address nor data")]
+    NoData {
+        /// Index of the buffer.
+        buffer: usize,
+    },
     /// Any other contradiction, in words.
     #[error("{0}")]
     Invalid(String),

@@ -81,17 +81,24 @@ impl<'a> Reader<'a> {
         let Some(position) = json::index(attributes, "POSITION", self.attributes_place())? else {
             return pass("no POSITION");
         };
-        let primitive = match json::extension(self.value, draco::EXTENSION) {
-            Some(compressed) => self.read_draco(compressed, attributes)?,
-            None => {
-                let accessor = self.accessor(position, "attributes.POSITION")?;
-                if accessor.count == 0 {
-                    return pass("no vertices");
+        let primitive = if let Some(compressed) = json::extension(self.value, draco::EXTENSION) {
+            self.read_draco(compressed, attributes)?
+        } else {
+            let accessor = self.accessor(position, "attributes.POSITION")?;
+            if accessor.count == 0 {
+                return pass("no vertices");
+            }
+            if !accessor.has_data() {
+                return pass("POSITION without data");
+            }
+            match self.read_plain(attributes, &accessor, topology) {
+                // Such a buffer is not wrong: the data may come by some other way. But there is nothing to simplify.
+                Err(DocumentError { place, problem: Problem::NoData { buffer } }) => {
+                    let text = format!("buffer {buffer} has no data, so there is nothing to make levels of");
+                    self.warnings.push(Warning { place, text });
+                    return pass("no data");
                 }
-                if !accessor.has_data() {
-                    return pass("POSITION without data");
-                }
-                self.read_plain(attributes, &accessor, topology)?
+                result => result?,
             }
         };
         if primitive.indices.is_empty() { pass("no triangles") } else { Ok(Outcome::Triangles(primitive)) }

@@ -21,7 +21,7 @@ pub struct View<'a> {
 /// All buffer views of a document. Compressed ones are decoded when first asked for, once.
 #[derive(Debug)]
 pub struct Views<'a> {
-    views: &'a [Value],
+    entries: &'a [Value],
     buffers: &'a Buffers,
     decoded: Vec<OnceLock<Result<Vec<u8>, DocumentError>>>,
 }
@@ -29,15 +29,15 @@ pub struct Views<'a> {
 impl<'a> Views<'a> {
     /// Prepares; decodes nothing yet.
     pub fn new(document: &'a Document, buffers: &'a Buffers) -> Result<Self, DocumentError> {
-        let views = document.array("bufferViews")?;
-        let decoded = views.iter().map(|_| OnceLock::new()).collect();
-        Ok(Self { views, buffers, decoded })
+        let entries = document.array("bufferViews")?;
+        let decoded = entries.iter().map(|_| OnceLock::new()).collect();
+        Ok(Self { entries, buffers, decoded })
     }
 
     /// The view `index`, which `place` refers to.
     pub fn get(&self, index: usize, place: impl Display) -> Result<View<'_>, DocumentError> {
-        let Some(view) = self.views.get(index) else {
-            let problem = Problem::Unresolved { kind: "buffer view", index: index as u64, count: self.views.len() };
+        let Some(view) = self.entries.get(index) else {
+            let problem = Problem::Unresolved { kind: "buffer view", index: index as u64, count: self.entries.len() };
             return Err(DocumentError::new(place, problem));
         };
         let place = format!("bufferViews[{index}]");

@@ -54,7 +54,9 @@ impl Decoded {
         let components = usize::from(attribute.num_components());
         let mut values = attribute.read_f32s(self.vertices(), components);
         if let Some(largest) = divisor(attribute, format) {
-            values.iter_mut().for_each(|v| *v = (*v / largest).max(-1.0));
+            for value in &mut values {
+                *value = (*value / largest).max(-1.0);
+            }
         }
         Ok((components, values))
     }
