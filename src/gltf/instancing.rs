@@ -3,10 +3,14 @@
 //!
 //! Knows how far a batch reaches and how large its instances are; writes no instances of its own.
 
+use super::accessor::Accessor;
+use super::buffers::Buffers;
 use super::coverage::Extent;
 use super::document::Document;
 use super::encode::unit;
+use super::error::DocumentError;
 use super::json;
+use super::views::Views;
 use crate::mesh::ComponentType;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -55,6 +59,29 @@ impl Batch {
 
 /// Batches by node. A node that has the extension but no entry is treated like a single object.
 pub type Batches = BTreeMap<usize, Batch>;
+
+/// Reads the batches of a document: every node that has the extension and instances in it.
+pub fn batches(document: &Document, buffers: &Buffers) -> Result<Batches, DocumentError> {
+    let views = Views::new(document, buffers)?;
+    let mut batches = Batches::new();
+    for (i, node) in document.array("nodes")?.iter().enumerate() {
+        let Some(extension) = json::extension(node, INSTANCING) else { continue };
+        let place = format!("nodes[{i}].extensions.{INSTANCING}.attributes");
+        let vectors = |name: &str| -> Result<Vec<[f32; 3]>, DocumentError> {
+            let attributes = extension.get("attributes").unwrap_or(&Value::Null);
+            let Some(accessor) = json::index(attributes, name, &place)? else { return Ok(Vec::new()) };
+            let numbers = Accessor::parse(document, accessor, &place)?.numbers(&views, None)?;
+            if numbers.components != 3 {
+                return Err(DocumentError::invalid(&place, format!("`{name}` must be of type `VEC3`")));
+            }
+            Ok(numbers.values.chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect())
+        };
+        if let Some(batch) = Batch::new(&vectors("TRANSLATION")?, &vectors("SCALE")?) {
+            batches.insert(i, batch);
+        }
+    }
+    Ok(batches)
+}
 
 /// Takes the entries that go with the mesh out of a node's `extensions`, and the object itself when nothing is left.
 pub(super) fn take_moving(node: &mut Map<String, Value>) -> Map<String, Value> {

@@ -59,7 +59,8 @@ pub struct MeshLevel {
 pub enum PrimitiveLevel {
     /// Not simplified (points, lines): the source's primitive again, with the same accessors.
     AsSource,
-    /// Simplified. Without indices the primitive is left out of the level.
+    /// Simplified. Without indices the primitive is left out of the level. Indices into the source's vertices are
+    /// those of its accessors (see [`super::scene::SourceMesh::source_indices`]).
     Level(Arc<LevelPrimitive>),
 }
 
@@ -460,3 +461,6 @@ impl Parts {
         node
     }
 }
+
+#[cfg(test)]
+mod tests;

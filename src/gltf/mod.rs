@@ -13,6 +13,8 @@ pub mod dependencies;
 pub mod document;
 mod encode;
 pub mod error;
+#[cfg(test)]
+mod fixture;
 mod follow;
 pub mod instancing;
 pub mod json;

@@ -1,5 +1,7 @@
 //! What a user should know about a written file although nothing failed: one note per matter, however often it occurs.
 
+use std::collections::BTreeSet;
+
 /// Something that was left out or done differently, and where.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
@@ -7,7 +9,7 @@ pub struct Note {
     pub place: String,
     /// In words, lowercase, without the place.
     pub text: String,
-    /// How often it occurred.
+    /// In how many places.
     pub count: usize,
 }
 
@@ -24,19 +26,19 @@ impl std::fmt::Display for Note {
 
 /// Collects notes in the order of their first occurrence.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Notes(Vec<Note>);
+pub(super) struct Notes(Vec<(Note, BTreeSet<String>)>);
 
 impl Notes {
     pub(super) fn add(&mut self, place: impl std::fmt::Display, text: impl Into<String>) {
-        let text = text.into();
-        match self.0.iter_mut().find(|note| note.text == text) {
-            Some(note) => note.count += 1,
-            None => self.0.push(Note { place: place.to_string(), text, count: 1 }),
+        let (place, text) = (place.to_string(), text.into());
+        match self.0.iter_mut().find(|(note, _)| note.text == text) {
+            Some((note, places)) => note.count += usize::from(places.insert(place)),
+            None => self.0.push((Note { place: place.clone(), text, count: 1 }, BTreeSet::from([place]))),
         }
     }
 
     pub(super) fn into_vec(self) -> Vec<Note> {
-        self.0
+        self.0.into_iter().map(|(note, _)| note).collect()
     }
 }
 
@@ -49,6 +51,7 @@ mod tests {
         let mut notes = Notes::default();
         notes.add("nodes[1]", "x is odd");
         notes.add("nodes[2]", "y is odd");
+        notes.add("nodes[3]", "x is odd");
         notes.add("nodes[3]", "x is odd");
         let words: Vec<String> = notes.into_vec().iter().map(ToString::to_string).collect();
         assert_eq!(words, ["nodes[1]: x is odd (and in one more place)", "nodes[2]: y is odd"]);

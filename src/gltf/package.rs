@@ -249,3 +249,6 @@ fn image_kind(bytes: &[u8]) -> Option<&'static str> {
     let known = || KINDS.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|&(_, kind)| kind);
     webp.then_some("image/webp").or(avif.then_some("image/avif")).or_else(known)
 }
+
+#[cfg(test)]
+mod tests;

@@ -99,3 +99,6 @@ fn indices(value: &Value, key: &str) -> Vec<usize> {
 fn index(value: &Value, key: &str) -> Option<usize> {
     value.get(key).and_then(super::json::integer).map(|i| i as usize)
 }
+
+#[cfg(test)]
+mod tests;
