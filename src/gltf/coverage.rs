@@ -50,8 +50,7 @@ impl Thresholds {
             let distance = if extent.batch { nearest + extent.radius } else { nearest };
             thresholds.errors.push(error * extent.scale);
             thresholds.distances.push(distance);
-            let share = extent.radius / (distance * tangent);
-            thresholds.coverage.push(if share.is_nan() { 1.0 } else { share });
+            thresholds.coverage.push(extent.radius / (distance * tangent));
         }
         for (slot, &given) in thresholds.coverage.iter_mut().zip(settings.coverage.iter().flatten()) {
             *slot = given;
@@ -67,8 +66,9 @@ impl Thresholds {
             self.coverage.insert(0, 1.0);
         }
         for share in &mut self.coverage {
-            // `max` and `min` also turn NaN, which an explicit number could be, into a number.
-            *share = share.max(SMALLEST).min(1.0).min(above * STEP);
+            // NaN: nothing has no size, and neither may a number that was given be one.
+            let number = if share.is_nan() { 1.0 } else { *share };
+            *share = number.clamp(SMALLEST, 1.0).min(above * STEP);
             above = *share;
         }
         if profile != Profile::Unreal {

@@ -87,16 +87,16 @@ impl<'d> LevelWriter<'d> {
         if let Some(&(i, found, expected)) = counts.iter().find(|&&(_, found, expected)| targets && found != expected) {
             return Err(role.error(i, LevelProblem::Targets { found, expected }));
         }
-        let entry = self.mesh_entry(&source, role, primitives, targets);
+        let entry = self.mesh_entry(&source, role, &primitives, targets);
         Ok(LevelMesh { entry, triangles, targets })
     }
 
-    fn mesh_entry(&mut self, source: &Value, role: Role, primitives: Vec<Value>, targets: bool) -> Value {
+    fn mesh_entry(&mut self, source: &Value, role: Role, primitives: &[Value], targets: bool) -> Value {
         let place = format!("meshes[{}]", role.mesh);
         let mut entry = Map::new();
         for (key, value) in source.as_object().into_iter().flatten() {
             let kept = match key.as_str() {
-                "primitives" => Some(Value::Array(primitives.clone())),
+                "primitives" => Some(Value::Array(primitives.to_vec())),
                 "name" => value.as_str().map(|name| json!(format!("{name}_LOD{}", role.number))),
                 "weights" => targets.then(|| value.clone()),
                 "extras" => Some(mesh_extras(value, targets)),

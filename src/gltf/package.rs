@@ -61,8 +61,8 @@ impl Package {
         let mut package = Self { document, dependencies, written: Vec::new(), converted, notes: Notes::default() };
         match container {
             _ if !converted => {}
-            Container::Glb => package.into_glb(buffers)?,
-            Container::Gltf => package.into_gltf(buffers)?,
+            Container::Glb => package.convert_to_glb(buffers)?,
+            Container::Gltf => package.convert_to_gltf(buffers)?,
         }
         Ok(package)
     }
@@ -77,7 +77,7 @@ impl Package {
         self.notes.clone().into_vec()
     }
 
-    fn into_glb(&mut self, buffers: &Buffers) -> Result<(), WriteError> {
+    fn convert_to_glb(&mut self, buffers: &Buffers) -> Result<(), WriteError> {
         self.document.container = Container::Glb;
         let mut bin = None;
         for (i, buffer) in self.document.array("buffers")?.to_vec().iter().enumerate() {
@@ -150,7 +150,7 @@ impl Package {
         }
     }
 
-    fn into_gltf(&mut self, buffers: &Buffers) -> Result<(), WriteError> {
+    fn convert_to_gltf(&mut self, buffers: &Buffers) -> Result<(), WriteError> {
         self.document.container = Container::Gltf;
         self.document.indented = true;
         let stands_for_bin = self.document.array("buffers")?.first().is_some_and(|first| first.get("uri").is_none());

@@ -9,6 +9,7 @@ use crate::gltf::document::{Container, Document};
 use crate::gltf::json;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::fmt::Write;
 
 /// Lists of the root that may grow at the end.
 const GROWING: [&str; 6] = ["accessors", "bufferViews", "buffers", "meshes", "nodes", "extensionsUsed"];
@@ -40,10 +41,11 @@ fn restore_anchor(root: &mut Value, source: &Document, group: &Group) {
     let before = &array(source, "nodes")[group.anchor];
     let mut child = root["nodes"][group.child].clone();
     // A repeated mesh stands for the one it repeats.
-    if let (Some(mesh), Some(original)) = (index(&child, "mesh"), index(before, "mesh")) {
-        if mesh >= array(source, "meshes").len() && root["meshes"][mesh] == root["meshes"][original] {
-            child["mesh"] = json!(original);
-        }
+    if let (Some(mesh), Some(original)) = (index(&child, "mesh"), index(before, "mesh"))
+        && mesh >= array(source, "meshes").len()
+        && root["meshes"][mesh] == root["meshes"][original]
+    {
+        child["mesh"] = json!(original);
     }
     let anchor = &mut root["nodes"][group.anchor];
     if let Some(children) = anchor["children"].as_array_mut() {
@@ -103,7 +105,9 @@ fn restore_vrm(output: &mut Value, source: &Value, anchors: &BTreeMap<usize, usi
         let list = output.pointer_mut(&place).and_then(Value::as_array_mut);
         if let (Some(length), Some(list)) = (length, list) {
             list.truncate(length);
-            list.iter_mut().for_each(|entry| restore_index(Some(entry), "node", anchors));
+            for entry in list {
+                restore_index(Some(entry), "node", anchors);
+            }
         }
     }
 }
@@ -206,7 +210,7 @@ fn compare(source: &Value, output: &Value, place: &mut String, differences: &mut
         }
         (Value::Array(before), Value::Array(after)) if before.len() == after.len() => {
             for (i, (value, other)) in before.iter().zip(after).enumerate() {
-                place.push_str(&format!("[{i}]"));
+                write!(place, "[{i}]").expect("writing to memory does not fail");
                 compare(value, other, place, differences);
                 place.truncate(length);
             }
