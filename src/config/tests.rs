@@ -1,3 +1,5 @@
+//! What the file, its errors and its ranges mean, by example.
+
 use std::fmt::Write;
 
 use super::*;

@@ -1,3 +1,5 @@
+//! Which part of a key each change moves.
+
 use super::*;
 use crate::config::{Pipeline, SceneSettings};
 use crate::mesh::hash::MeshHash;

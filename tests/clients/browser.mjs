@@ -57,6 +57,7 @@ export async function open(engines) {
   const urls = {
     draco: `${server.url(path.join(modules, 'three/examples/jsm/libs/draco/gltf'))}/`,
     basis: `${server.url(path.join(modules, 'three/examples/jsm/libs/basis'))}/`,
+    babylon: `${server.url(path.join(modules, '@babylonjs/core/assets'))}/`,
   };
   return {
     server,

@@ -8,6 +8,7 @@ import { RoomEnvironment } from 'three/examples/jsm/environments/RoomEnvironment
 import { MeshoptDecoder } from 'meshoptimizer/decoder';
 import GLTFLodExtension from 'three-gltf-extensions/loaders/MSFT_lod/MSFT_lod.js';
 import { FIELD_OF_VIEW, camera as cameraOf, rhombicuboctahedron } from './views.mjs';
+import { client, covered } from './check.mjs';
 
 let renderer;
 let loader;
@@ -17,6 +18,7 @@ let current = null;
 function start(urls) {
   renderer = new THREE.WebGLRenderer({ antialias: false, preserveDrawingBuffer: true });
   renderer.setPixelRatio(1);
+  renderer.setClearColor(0x000000, 0);
   document.body.append(renderer.domElement);
   const draco = new DRACOLoader().setDecoderPath(urls.draco);
   const ktx2 = new KTX2Loader().setTranscoderPath(urls.basis).detectSupport(renderer);
@@ -39,9 +41,11 @@ function clear() {
   current = null;
 }
 
-async function load(url) {
+/** Loads `url` and shows level 0; `anchors` (see document.mjs) puts what is drawn in the source's order. */
+async function load(url, { anchors = {} } = {}) {
   clear();
   const gltf = await loader.loadAsync(url);
+  gltf.scene ??= new THREE.Group(); // a file may have no scene
   const stage = new THREE.Scene();
   const lods = [];
   stage.add(gltf.scene);
@@ -50,28 +54,48 @@ async function load(url) {
     if (object.isLOD) (lods.push(object), (object.autoUpdate = false));
   });
   current = { gltf, stage, scene: gltf.scene, lods, mixer: null };
+  const key = sortKeys(gltf.parser, anchors);
+  const bySource = (a, b) => a.groupOrder - b.groupOrder || key(a.object) - key(b.object) || a.id - b.id;
+  renderer.setOpaqueSort(bySource);
+  renderer.setTransparentSort((a, b) => a.groupOrder - b.groupOrder || b.z - a.z || bySource(a, b));
   show(0);
   stage.updateMatrixWorld(true);
-  return { sphere: sphereOf(), levels: Math.max(1, ...lods.map((lod) => lod.levels.length)), animations: gltf.animations.length };
+  return { levels: Math.max(1, ...lods.map((lod) => lod.levels.length)), animations: gltf.animations.length };
+}
+
+/** Objects by the source node they belong to, whatever order they were loaded in. */
+function sortKeys(parser, anchors) {
+  const keys = new Map();
+  return (object) => {
+    if (!keys.has(object)) {
+      let owner = object;
+      while (owner && parser.associations.get(owner)?.nodes === undefined) owner = owner.parent;
+      const node = owner ? parser.associations.get(owner).nodes : 1e6;
+      keys.set(object, (anchors[node] ?? node) * 1e3 + (parser.associations.get(object)?.primitives ?? 0));
+    }
+    return keys.get(object);
+  };
+}
+
+/** Objects with geometry that are shown now. */
+function shown() {
+  const found = [];
+  current.scene.traverseVisible((object) => object.geometry && found.push(object));
+  return found;
 }
 
 /** The bounding sphere of the box round everything drawn, as drawn now. */
-function sphereOf() {
+function sphere() {
   const box = new THREE.Box3();
-  current.scene.traverseVisible((object) => {
-    if (object.geometry) box.expandByObject(object.isSkinnedMesh || object.isInstancedMesh ? object : shallow(object));
-  });
-  const sphere = box.isEmpty() ? new THREE.Sphere(new THREE.Vector3(), 1) : box.getBoundingSphere(new THREE.Sphere());
-  return { center: sphere.center.toArray(), radius: sphere.radius };
-}
-
-/** `expandByObject` descends into children, hidden levels too: a copy without them. */
-function shallow(object) {
-  const copy = new THREE.Mesh(object.geometry);
-  copy.matrixAutoUpdate = false;
-  copy.matrix.copy(object.matrixWorld);
-  copy.matrixWorld.copy(object.matrixWorld);
-  return copy;
+  const one = new THREE.Box3();
+  for (const object of shown()) {
+    // Skins and instances know their own bounds; `expandByObject` would count hidden levels among the children.
+    if (object.isSkinnedMesh || object.isInstancedMesh) (object.computeBoundingBox(), one.copy(object.boundingBox));
+    else (object.geometry.computeBoundingBox(), one.copy(object.geometry.boundingBox));
+    if (!one.isEmpty()) box.union(one.applyMatrix4(object.matrixWorld));
+  }
+  const ball = box.isEmpty() ? new THREE.Sphere(new THREE.Vector3(), 1) : box.getBoundingSphere(new THREE.Sphere());
+  return { center: ball.center.toArray(), radius: ball.radius };
 }
 
 /** Shows level `k` of every group, the last one where a group has fewer. */
@@ -91,12 +115,58 @@ function seek(seconds) {
 
 function triangles() {
   let count = 0;
-  current.scene.traverseVisible((object) => {
-    if (!object.isMesh) return;
+  for (const object of shown()) {
+    if (!object.isMesh) continue;
     const { index, attributes } = object.geometry;
     count += ((index ?? attributes.position).count / 3) * (object.isInstancedMesh ? object.count : 1);
-  });
+  }
   return Math.round(count);
+}
+
+function facts() {
+  const objects = shown();
+  const materials = new Set(objects.flatMap((object) => object.material));
+  const textures = new Set([...materials].flatMap((material) => Object.values(material).filter((value) => value?.isTexture)));
+  const skeletons = new Set(objects.filter((object) => object.skeleton).map((object) => object.skeleton));
+  const { gltf, scene } = current;
+  const nodes = new Set();
+  let lights = 0;
+  scene.traverse((object) => {
+    lights += object.isLight ? 1 : 0;
+    const node = gltf.parser.associations.get(object)?.nodes;
+    if (node !== undefined) nodes.add(node);
+  });
+  return {
+    meshes: objects.length,
+    triangles: triangles(),
+    vertices: objects.reduce((sum, object) => sum + (object.geometry.attributes.position?.count ?? 0), 0),
+    skinned: objects.filter((object) => object.isSkinnedMesh).length,
+    morphed: objects.filter((object) => object.morphTargetInfluences?.length > 0).length,
+    instances: objects.reduce((sum, object) => sum + (object.isInstancedMesh ? object.count : 0), 0),
+    materials: [...materials].map((material) => `${material.type} ${material.name}`).sort(),
+    textures: textures.size,
+    skeletons: [...skeletons].map((skeleton) => skeleton.bones.length).sort((a, b) => a - b),
+    lights,
+    cameras: gltf.cameras.length,
+    animations: gltf.animations.map((clip) => ({
+      name: clip.name,
+      seconds: Math.round(1000 * clip.duration) / 1000,
+      tracks: clip.tracks.filter((track) => !track.name.endsWith('.morphTargetInfluences')).length,
+    })),
+    nodes: [...nodes].sort((a, b) => a - b),
+    groups: current.lods.map((lod) => [gltf.parser.associations.get(lod.levels[0].object)?.nodes, lod.levels.length]).sort((a, b) => a[0] - b[0]),
+  };
+}
+
+/** Shows each level of the file that stands on the stage. */
+async function levels(_url, options, view) {
+  const found = [];
+  for (let level = 1; level < options.levels; level++) {
+    show(level);
+    found.push({ level, triangles: triangles(), pixels: covered(pixelsOf(view, view.size)) });
+  }
+  show(0);
+  return found;
 }
 
 function draw(view, size) {
@@ -115,9 +185,17 @@ function draw(view, size) {
   current.stage.remove(...lights);
 }
 
+function pixelsOf(view, size) {
+  draw(view, size);
+  const gl = renderer.getContext();
+  const rgba = new Uint8Array(4 * size * size);
+  gl.readPixels(0, 0, size, size, gl.RGBA, gl.UNSIGNED_BYTE, rgba);
+  return rgba;
+}
+
 /** Draws cells of one file (already loaded) onto a row of the sheet, which `picture` made. */
 function paintRow(sheet, row, request) {
-  const { size, levels, views, sphere, label, wire } = request;
+  const { size, levels, views, frame, label, wire } = request;
   if (!pictureLight) {
     const generator = new THREE.PMREMGenerator(renderer);
     pictureLight = generator.fromScene(new RoomEnvironment(), 0.04).texture;
@@ -132,7 +210,7 @@ function paintRow(sheet, row, request) {
     show(level);
     const caption = `${label}  L${level}  ${triangles().toLocaleString('en')} tri`;
     for (const view of views) {
-      draw(cameraOf(sphere, directions[view % 24]), size);
+      draw(cameraOf(frame, directions[view % 24]), size);
       const [x, y] = [column++ * size, row * (size + 16)];
       sheet.drawImage(renderer.domElement, x, y + 16);
       sheet.fillText(`${caption}  v${view}`, x + 4, y + 12, size - 8);
@@ -150,7 +228,8 @@ async function picture(rows, { size, views, wire, sameFrame }) {
     const loaded = await load(row.url);
     const levels = row.levels ?? [...Array(loaded.levels).keys()];
     if (row.time > 0) seek(row.time);
-    first ??= loaded.sphere;
+    const own = sphere();
+    first ??= own;
     if (!sheet) {
       const columns = Math.max(levels.length, ...rows.map((r) => r.levels?.length ?? loaded.levels)) * views.length;
       canvas.width = columns * size;
@@ -161,11 +240,11 @@ async function picture(rows, { size, views, wire, sameFrame }) {
       sheet.fillStyle = '#000';
       sheet.font = '12px sans-serif';
     }
-    paintRow(sheet, i, { size, levels, views, sphere: sameFrame ? first : loaded.sphere, label: row.label, wire });
+    paintRow(sheet, i, { size, levels, views, frame: sameFrame ? first : own, label: row.label, wire });
     facts.push(loaded);
   }
   clear();
   return { png: canvas.toDataURL('image/png').split(',')[1], facts };
 }
 
-globalThis.client = { start, picture };
+globalThis.client = client({ start, picture, load, facts, sphere, seek, draw: pixelsOf, levels });
