@@ -330,6 +330,7 @@ fn words<const SIZE: usize>(bytes: &[u8]) -> impl Iterator<Item = [u8; SIZE]> {
 }
 
 #[cfg(test)]
+#[expect(clippy::needless_pass_by_value, reason = "tests read better with `json!` in place")]
 mod tests {
     use super::*;
     use crate::gltf::buffers::Buffers;

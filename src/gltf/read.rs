@@ -113,3 +113,7 @@ fn missing_images(document: &Document, base: &Path) -> Result<Vec<Warning>, Docu
     }
     Ok(warnings)
 }
+
+#[cfg(test)]
+#[expect(clippy::needless_pass_by_value, reason = "tests read better with `json!` in place")]
+mod tests;

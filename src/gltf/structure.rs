@@ -235,6 +235,7 @@ impl<'a> Check<'a> {
 }
 
 #[cfg(test)]
+#[expect(clippy::needless_pass_by_value, reason = "tests read better with `json!` in place")]
 mod tests {
     use super::*;
     use crate::gltf::document::Container;
