@@ -20,6 +20,8 @@ const FILE_LIMIT_MS = 90_000;
 const FILES_PER_PAGE = 20;
 /** Babylon loads a file anew for each level it shows; above this many bytes only the coarsest is tried. */
 const ALL_LEVELS_BYTES = 1_000_000;
+/** Share of the sources that an engine may fail to read, before the set-up is suspected. */
+const MOST_UNREAD = 0.25;
 
 class TimedOut extends Error {}
 
@@ -107,7 +109,7 @@ async function judge(client, engine, pair, plan) {
   const before = await step('source', pair.source, { anchors: {}, ranges: false });
   const after = await step('output', pair.output, { ranges: false });
   const wrong = newErrors(before.errors, after.errors).map((text) => `error: ${text}`);
-  if (!before.result) return { wrong, listed: before.errors[0] ?? 'does not load' };
+  if (!before.result) return { wrong, listed: before.errors[0] ?? 'does not load', unread: true };
   if (!after.result) return { wrong: wrong.length > 0 ? wrong : ['the source loads, the output does not'] };
   wrong.push(...changedFacts(before.result.facts, after.result.facts));
   for (const { view, time, pixels, most, shot } of after.result.differing) {
@@ -183,6 +185,15 @@ function tell(verdicts, slowest) {
   return failed.length;
 }
 
+/** Engines that read so few of the sources that the set-up must be at fault: their silence proves nothing. */
+function idleEngines(verdicts) {
+  const engines = [...new Set(verdicts.map((v) => v.engine))];
+  return engines.filter((engine) => {
+    const own = verdicts.filter((v) => v.engine === engine);
+    return own.filter((v) => v.unread).length > own.length * MOST_UNREAD;
+  });
+}
+
 /** Judges every pair below two folders; returns the verdicts. */
 export async function run(source, output, options) {
   const { pairs, missing } = await pairUp(source, output);
@@ -213,10 +224,12 @@ async function main() {
   if (positionals.length !== 2) throw new Error(USAGE);
   const start = Date.now();
   const { verdicts, missing } = await run(positionals[0], positionals[1], { ...values, size: Number(values.size) });
-  const failed = tell(verdicts, Number(values.slowest));
+  const idle = idleEngines(verdicts);
+  const failed = tell(verdicts, Number(values.slowest)) + idle.length;
+  for (const engine of idle) console.log(`\n${engine} reads less than ${100 * (1 - MOST_UNREAD)} % of the sources: is it set up right?`);
   if (missing.length > 0) console.log(`\n${missing.length} source(s) without an output: ${missing.join(', ')}`);
   console.log(`\n${verdicts.length} loads against their sources in ${((Date.now() - start) / 1000).toFixed(0)} s`);
-  console.log(`${verdicts.length - failed} passed, ${failed} failed`);
+  console.log(`${verdicts.length + idle.length - failed} passed, ${failed} failed`);
   process.exitCode = failed > 0 ? 1 : 0;
 }
 

@@ -3,7 +3,7 @@
 import { readFile } from 'node:fs/promises';
 import path from 'node:path';
 import validator from 'gltf-validator';
-import { pairUp } from './document.mjs';
+import { pairUp, readDocument } from './document.mjs';
 
 const SEVERITY_ERROR = 0;
 const USAGE = 'usage: node validate.mjs SOURCE_DIR OUTPUT_DIR';
@@ -55,18 +55,23 @@ function isAppended(pointer, counts) {
   return match !== null && Number(match[2]) >= (counts[match[1]] ?? 0);
 }
 
+/** What is wrong with one output, a line each. */
+export async function judgePair(pair) {
+  const found = offenders(await report(pair.source), await report(pair.output), await arrayLengths(pair.source));
+  return found.map(({ code, before, after, example }) => {
+    return `${code}: ${before} in the source, ${after} in the output; ${example.pointer}: ${example.message}`;
+  });
+}
+
 async function main() {
   const [source, output] = process.argv.slice(2);
   if (!output) throw new Error(USAGE);
   const { pairs, missing } = await pairUp(source, output);
   let failed = 0;
   for (const pair of pairs) {
-    const counts = await arrayLengths(pair.source);
-    const found = offenders(await report(pair.source), await report(pair.output), counts);
+    const found = await judgePair(pair);
     if (found.length > 0) failed++;
-    for (const { code, before, after, example } of found) {
-      console.log(`${pair.name}: ${code}: ${before} in the source, ${after} in the output; ${example.pointer}: ${example.message}`);
-    }
+    for (const line of found) console.log(`${pair.name}: ${line}`);
   }
   if (missing.length > 0) console.log(`${missing.length} source(s) without an output: ${missing.join(', ')}`);
   if (pairs.length === 0) throw new Error(`no output of ${source} found in ${output}`);
@@ -76,7 +81,6 @@ async function main() {
 }
 
 async function arrayLengths(file) {
-  const { readDocument } = await import('./document.mjs');
   const { json } = await readDocument(file).catch(() => ({ json: {} }));
   return Object.fromEntries(Object.entries(json ?? {}).filter(([, v]) => Array.isArray(v)).map(([key, v]) => [key, v.length]));
 }
