@@ -4,6 +4,8 @@
 //! random, noise, turn ──▶ surface, solid, field ──▶ coats (textures) ──▶ props, plaza, figure ──▶ gltf ──▶ scenes/
 //! ```
 
+#![expect(clippy::disallowed_methods, reason = "every vector normalised here is the program's own and has a length")]
+
 mod coats;
 mod field;
 mod gltf;
