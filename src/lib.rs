@@ -24,6 +24,7 @@ pub mod obj;
 pub mod identify;
 pub mod key;
 pub mod progress;
+pub mod emit;
 pub mod report;
 pub mod command;
 pub mod cli;

@@ -1,19 +1,33 @@
 //! glTF in and out: the only room that knows the format and its compression crates.
 //!
 //! `document` holds a file without loss; `buffers`, `accessor` and `decode` turn its bytes into numbers; `read` puts
-//! a whole scene together.
+//! a whole scene together. `lod` appends levels to a document (`write` the binary data, `level_mesh` the meshes,
+//! `follow` whoever pointed at them), `package` makes files of it, and `rules` checks them.
 
 pub mod accessor;
 pub mod buffers;
+mod carry;
+mod coverage;
 pub mod decode;
 pub mod dependencies;
 pub mod document;
+mod encode;
 pub mod error;
+#[cfg(test)]
+mod fixture;
+mod follow;
+pub mod instancing;
 pub mod json;
+mod level_mesh;
+pub mod lod;
+mod notes;
+pub mod package;
 pub mod primitive;
 pub mod read;
+pub mod rules;
 pub mod scene;
 pub mod structure;
 pub mod triangles;
 pub mod uri;
 pub mod views;
+pub mod write;

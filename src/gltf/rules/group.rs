@@ -1,0 +1,230 @@
+//! One group of levels: its anchor, its child, its level nodes, and the rules that can be seen on them alone.
+
+use super::{Found, Rule, array, index, indices};
+use crate::gltf::document::Document;
+use crate::gltf::json;
+use serde_json::Value;
+
+/// What no node below an anchor may have.
+const TRANSFORM_KEYS: [&str; 5] = ["translation", "rotation", "scale", "matrix", "children"];
+
+/// What leaves an anchor together with its mesh.
+const MESH_KEYS: [&str; 3] = ["mesh", "skin", "weights"];
+const MESH_EXTENSIONS: [&str; 2] = ["EXT_mesh_gpu_instancing", "EXT_instance_features"];
+
+/// A group that the output has and the source has not.
+pub(super) struct Group {
+    /// A node of the source.
+    pub(super) anchor: usize,
+    /// Carries the extension.
+    pub(super) child: usize,
+    /// Finest first.
+    pub(super) levels: Vec<usize>,
+}
+
+impl Group {
+    /// Groups on appended nodes, in the order of their children.
+    pub(super) fn find_all(source: &Document, output: &Document, found: &mut Found) -> Vec<Self> {
+        let nodes = array(output, "nodes");
+        let old = array(source, "nodes").len();
+        let mut parents = vec![Vec::new(); nodes.len()];
+        for (i, node) in nodes.iter().enumerate() {
+            for child in indices(node, "children") {
+                if let Some(list) = parents.get_mut(child) {
+                    list.push(i);
+                }
+            }
+        }
+        let mut groups: Vec<Self> = Vec::new();
+        for child in old..nodes.len() {
+            let Some(lod) = json::extension(&nodes[child], "MSFT_lod") else { continue };
+            let place = format!("nodes[{child}]");
+            let [anchor] = parents[child][..] else {
+                found.add(
+                    Rule::Transforms,
+                    place,
+                    format!("has {} parents instead of an anchor", parents[child].len()),
+                );
+                continue;
+            };
+            if anchor >= old {
+                found.add(Rule::Transforms, place, format!("its anchor {anchor} is not a node of the source"));
+                continue;
+            }
+            if let Some(other) = groups.iter().find(|group| group.anchor == anchor) {
+                let text = format!("shares its anchor {anchor} with node {}", other.child);
+                found.add(Rule::OwnAnchor, &place, text);
+            }
+            let levels = indices(lod, "ids");
+            let sound = !levels.is_empty() && levels.iter().all(|&level| level >= old && level < nodes.len());
+            found.require(sound, Rule::Roles, &place, "`MSFT_lod.ids` are not appended nodes");
+            if sound {
+                groups.push(Self { anchor, child, levels });
+            }
+        }
+        groups
+    }
+
+    pub(super) fn check(&self, source: &Document, output: &Document, found: &mut Found) {
+        self.check_anchor(source, output, found);
+        self.check_transforms(output, found);
+        self.check_coverage(output, found);
+        self.check_followers(output, found);
+        self.check_materials(output, found);
+    }
+
+    /// Child first, then the levels.
+    pub(super) fn members(&self) -> impl Iterator<Item = usize> {
+        std::iter::once(self.child).chain(self.levels.iter().copied())
+    }
+
+    fn check_anchor(&self, source: &Document, output: &Document, found: &mut Found) {
+        let place = format!("nodes[{}]", self.anchor);
+        let (before, after) = (&array(source, "nodes")[self.anchor], &array(output, "nodes")[self.anchor]);
+        found.require(before.get("mesh").is_some(), Rule::Transforms, &place, "is an anchor but never had a mesh");
+        for key in MESH_KEYS {
+            found.require(after.get(key).is_none(), Rule::Follow, &place, format!("`{key}` is still on the anchor"));
+        }
+        for name in MESH_EXTENSIONS {
+            let gone = after.get("extensions").is_none_or(|e| e.get(name).is_none());
+            found.require(gone, Rule::Instances, &place, format!("`{name}` is still on the anchor"));
+        }
+    }
+
+    fn check_transforms(&self, output: &Document, found: &mut Found) {
+        for member in self.members() {
+            let (place, node) = (format!("nodes[{member}]"), &array(output, "nodes")[member]);
+            for key in TRANSFORM_KEYS {
+                let text = format!("`{key}` belongs to the anchor");
+                found.require(node.get(key).is_none(), Rule::Transforms, &place, text);
+            }
+            found.require(index(node, "mesh").is_some(), Rule::Roles, &place, "a level without a mesh");
+        }
+    }
+
+    fn check_coverage(&self, output: &Document, found: &mut Found) {
+        let place = format!("nodes[{}].extras", self.child);
+        let extras = &array(output, "nodes")[self.child]["extras"];
+        let coverage: Vec<f64> = numbers(&extras["MSFT_screencoverage"]);
+        // Readers for which a number is where its level starts get 1 first instead of 0 last.
+        let by_start = extras["lodbake"]["coverage"] == "start";
+        let ends = if by_start { coverage.first() == Some(&1.0) } else { coverage.last() == Some(&0.0) };
+        let length = coverage.len() == self.levels.len() + 1;
+        found.require(
+            length,
+            Rule::Coverage,
+            &place,
+            format!("{} levels but coverage {coverage:?}", self.levels.len()),
+        );
+        found.require(ends, Rule::Coverage, &place, format!("coverage {coverage:?} does not end in 0"));
+        let falls = coverage.windows(2).all(|w| (w[1] as f32) < w[0] as f32);
+        let range = coverage.iter().all(|c| (0.0..=1.0).contains(c));
+        found.require(
+            falls && range,
+            Rule::Coverage,
+            &place,
+            format!("coverage {coverage:?} is not falling within [0, 1]"),
+        );
+        for list in ["errors", "distances", "triangles"] {
+            let length = extras["lodbake"][list].as_array().map(Vec::len);
+            let text = format!("`lodbake.{list}` is not one number for each level");
+            found.require(length == Some(self.levels.len()), Rule::Coverage, &place, text);
+        }
+        let distances = numbers(&extras["lodbake"]["distances"]);
+        let grows = distances.windows(2).all(|w| w[0] <= w[1]);
+        found.require(grows, Rule::Coverage, &place, "`lodbake.distances` do not grow");
+    }
+
+    fn check_followers(&self, output: &Document, found: &mut Found) {
+        let nodes = array(output, "nodes");
+        let child = &nodes[self.child];
+        for &level in &self.levels {
+            let (place, node) = (format!("nodes[{level}]"), &nodes[level]);
+            let same_skin = node.get("skin") == child.get("skin");
+            found.require(same_skin, Rule::Follow, &place, "has another skin than level 0");
+            let weights = if has_targets(output, node) { child.get("weights") } else { None };
+            found.require(node.get("weights") == weights, Rule::Follow, &place, "has other weights than level 0");
+            for name in MESH_EXTENSIONS {
+                let same = extension(node, name) == extension(child, name);
+                found.require(same, Rule::Instances, &place, format!("`{name}` differs from level 0"));
+            }
+            let strays = node.get("extras").is_some() || extension(node, "MSFT_lod").is_some();
+            found.require(!strays, Rule::Roles, &place, "a level says something of levels itself");
+        }
+        for (a, animation) in array(output, "animations").iter().enumerate() {
+            self.check_channels(output, animation, a, found);
+        }
+    }
+
+    /// What drives the child's weights drives every level's, by the same sampler.
+    fn check_channels(&self, output: &Document, animation: &Value, a: usize, found: &mut Found) {
+        let nodes = array(output, "nodes");
+        let channels: Vec<&Value> = animation.get("channels").and_then(Value::as_array).into_iter().flatten().collect();
+        for (c, channel) in channels.iter().enumerate() {
+            let place = format!("animations[{a}].channels[{c}]");
+            let Some((node, rest)) = target(channel) else { continue };
+            let of_mesh = rest.split('/').next().is_some_and(|key| MESH_KEYS.contains(&key));
+            found.require(
+                !(node == self.anchor && of_mesh),
+                Rule::Follow,
+                &place,
+                "drives the anchor, the mesh is below it",
+            );
+            let member = self.members().any(|m| m == node);
+            let known = of_mesh || MESH_EXTENSIONS.iter().any(|name| rest.starts_with(&format!("extensions/{name}/")));
+            found.require(!member || known, Rule::Transforms, &place, "moves a level instead of the anchor");
+            if node != self.child {
+                continue;
+            }
+            for &level in self.levels.iter().filter(|&&l| rest.starts_with("weights") <= has_targets(output, &nodes[l]))
+            {
+                let twin = |other: &&Value| {
+                    target(other) == Some((level, rest.clone())) && other.get("sampler") == channel.get("sampler")
+                };
+                let text = format!("drives level 0 but not node {level}");
+                found.require(channels.iter().any(twin), Rule::Follow, &place, text);
+            }
+        }
+    }
+
+    /// Each primitive of a level is one of level 0, in order: the same material with the same variants.
+    fn check_materials(&self, output: &Document, found: &mut Found) {
+        let (nodes, meshes) = (array(output, "nodes"), array(output, "meshes"));
+        let primitives = |node: usize| -> Vec<&Value> {
+            let mesh = index(&nodes[node], "mesh").and_then(|mesh| meshes.get(mesh));
+            mesh.and_then(|m| m["primitives"].as_array()).into_iter().flatten().collect()
+        };
+        let look = |p: &Value| (p.get("material").cloned(), extension(p, "KHR_materials_variants").cloned());
+        for &level in &self.levels {
+            let mut finest = primitives(self.child).into_iter();
+            let all = primitives(level).into_iter().all(|p| finest.any(|f| look(f) == look(p)));
+            let text = "a level's primitive has a material or variants that level 0 has not";
+            found.require(all, Rule::Follow, format_args!("nodes[{level}].mesh"), text);
+            found.require(!primitives(level).is_empty(), Rule::Roles, format_args!("nodes[{level}].mesh"), "is empty");
+        }
+    }
+}
+
+/// Node and property that a channel drives: `(3, "weights")`.
+fn target(channel: &Value) -> Option<(usize, String)> {
+    let target = channel.get("target")?;
+    if let Some(pointer) = target.pointer("/extensions/KHR_animation_pointer/pointer").and_then(Value::as_str) {
+        let (node, rest) = pointer.strip_prefix("/nodes/")?.split_once('/')?;
+        return Some((node.parse().ok()?, rest.to_owned()));
+    }
+    Some((index(target, "node")?, target.get("path")?.as_str()?.to_owned()))
+}
+
+fn has_targets(output: &Document, node: &Value) -> bool {
+    let mesh = index(node, "mesh").and_then(|mesh| array(output, "meshes").get(mesh));
+    let first = mesh.and_then(|m| m["primitives"].get(0));
+    first.and_then(|p| p["targets"].as_array()).is_some_and(|targets| !targets.is_empty())
+}
+
+fn extension<'v>(value: &'v Value, name: &str) -> Option<&'v Value> {
+    value.get("extensions")?.get(name)
+}
+
+fn numbers(list: &Value) -> Vec<f64> {
+    list.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
+}
