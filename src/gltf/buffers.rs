@@ -98,11 +98,15 @@ impl Buffers {
     }
 }
 
+/// Does this buffer stand for data that only exists compressed?
+pub(super) fn is_fallback(buffer: &Value) -> bool {
+    EXTENSIONS.iter().any(|name| json::extension(buffer, name).is_some())
+}
+
 /// The first buffer of a GLB is its BIN chunk, unless it stands for data that only exists compressed.
 fn bin_chunk(document: &Document, buffer: &Value, place: &str) -> Result<Option<Blob>, DocumentError> {
     let bin = document.bin.clone().map(Blob::Chunk);
-    let is_fallback = EXTENSIONS.iter().any(|name| json::extension(buffer, name).is_some());
-    if bin.is_none() && !is_fallback {
+    if bin.is_none() && !is_fallback(buffer) {
         return Err(DocumentError::new(place, Problem::Glb("there is no BIN chunk for this buffer".to_owned())));
     }
     Ok(bin)

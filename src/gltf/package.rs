@@ -9,9 +9,10 @@
 //! no second BIN chunk, which the format has not. What is neither a buffer nor an image in `images` (a schema, an
 //! alternative in an extension) stays a file beside the document. Writes no files itself.
 
-use super::buffers::Buffers;
+use super::buffers::{self, Buffers};
 use super::dependencies::{Dependency, DependencyKind};
 use super::document::{Container, Document};
+use super::error::DocumentError;
 use super::json;
 use super::notes::{Note, Notes};
 use super::uri;
@@ -97,7 +98,12 @@ impl Package {
         if bin.is_none() && self.document.array("buffers")?.is_empty() {
             bin = Some(Vec::new());
         }
-        // With a first buffer that has no data there can be no BIN chunk: it would stand for that buffer.
+        if let Some(first) = self.document.array("buffers")?.first().filter(|_| bin.is_none()) {
+            // Only compressed scenes declare buffers without data for a reason. A BIN chunk would be that data.
+            if !buffers::is_fallback(first) {
+                return Err(DocumentError::invalid("buffers[0]", "has no data, and in a GLB it must have some").into());
+            }
+        }
         if let Some(mut bin) = bin {
             self.embed_images(&mut bin)?;
             if !bin.is_empty() {

@@ -129,6 +129,10 @@ fn a_first_buffer_without_data_leaves_no_room_for_a_bin_chunk() {
     assert_eq!(output.bin, None);
     assert_eq!(output.json["buffers"][0], source.json["buffers"][0]);
     assert_eq!(files.beside.len(), 1);
+    source.json["buffers"][0].as_object_mut().unwrap().shift_remove("extensions");
+    let buffers = Buffers::load(&source, Path::new("")).unwrap();
+    let refused = Package::new(source, &buffers, Vec::new(), Container::Glb).unwrap_err().to_string();
+    assert_eq!(refused, "buffers[0]: has no data, and in a GLB it must have some");
 }
 
 #[test]
