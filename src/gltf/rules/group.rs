@@ -1,16 +1,18 @@
 //! One group of levels: its anchor, its child, its level nodes, and the rules that can be seen on them alone.
 
+use super::drives::{Drive, Drives};
 use super::{Found, Rule, array, index, indices};
 use crate::gltf::document::Document;
 use crate::gltf::json;
 use serde_json::Value;
+use std::collections::BTreeMap;
 
 /// What no node below an anchor may have.
 const TRANSFORM_KEYS: [&str; 5] = ["translation", "rotation", "scale", "matrix", "children"];
 
 /// What leaves an anchor together with its mesh.
-const MESH_KEYS: [&str; 3] = ["mesh", "skin", "weights"];
-const MESH_EXTENSIONS: [&str; 2] = ["EXT_mesh_gpu_instancing", "EXT_instance_features"];
+pub(super) const MESH_KEYS: [&str; 3] = ["mesh", "skin", "weights"];
+pub(super) const MESH_EXTENSIONS: [&str; 2] = ["EXT_mesh_gpu_instancing", "EXT_instance_features"];
 
 /// A group that the output has and the source has not.
 pub(super) struct Group {
@@ -36,6 +38,7 @@ impl Group {
             }
         }
         let mut groups: Vec<Self> = Vec::new();
+        let mut children: BTreeMap<usize, usize> = BTreeMap::new();
         for child in old..nodes.len() {
             let Some(lod) = json::extension(&nodes[child], "MSFT_lod") else { continue };
             let place = format!("nodes[{child}]");
@@ -51,9 +54,8 @@ impl Group {
                 found.add(Rule::Transforms, place, format!("its anchor {anchor} is not a node of the source"));
                 continue;
             }
-            if let Some(other) = groups.iter().find(|group| group.anchor == anchor) {
-                let text = format!("shares its anchor {anchor} with node {}", other.child);
-                found.add(Rule::OwnAnchor, &place, text);
+            if let Some(other) = children.insert(anchor, child) {
+                found.add(Rule::OwnAnchor, &place, format!("shares its anchor {anchor} with node {other}"));
             }
             let levels = indices(lod, "ids");
             let sound = !levels.is_empty() && levels.iter().all(|&level| level >= old && level < nodes.len());
@@ -65,11 +67,12 @@ impl Group {
         groups
     }
 
-    pub(super) fn check(&self, source: &Document, output: &Document, found: &mut Found) {
+    pub(super) fn check(&self, source: &Document, output: &Document, drives: &Drives<'_>, found: &mut Found) {
         self.check_anchor(source, output, found);
         self.check_transforms(output, found);
         self.check_coverage(output, found);
         self.check_followers(output, found);
+        self.check_drives(output, drives, found);
         self.check_materials(output, found);
     }
 
@@ -151,38 +154,30 @@ impl Group {
             let strays = node.get("extras").is_some() || extension(node, "MSFT_lod").is_some();
             found.require(!strays, Rule::Roles, &place, "a level says something of levels itself");
         }
-        for (a, animation) in array(output, "animations").iter().enumerate() {
-            self.check_channels(output, animation, a, found);
-        }
     }
 
-    /// What drives the child's weights drives every level's, by the same sampler.
-    fn check_channels(&self, output: &Document, animation: &Value, a: usize, found: &mut Found) {
+    /// Channels move the anchor; what drives the child's weights drives every level's, by the same sampler.
+    fn check_drives(&self, output: &Document, drives: &Drives<'_>, found: &mut Found) {
         let nodes = array(output, "nodes");
-        let channels: Vec<&Value> = animation.get("channels").and_then(Value::as_array).into_iter().flatten().collect();
-        for (c, channel) in channels.iter().enumerate() {
-            let place = format!("animations[{a}].channels[{c}]");
-            let Some((node, rest)) = target(channel) else { continue };
-            let of_mesh = rest.split('/').next().is_some_and(|key| MESH_KEYS.contains(&key));
-            found.require(
-                !(node == self.anchor && of_mesh),
-                Rule::Follow,
-                &place,
-                "drives the anchor, the mesh is below it",
-            );
-            let member = self.members().any(|m| m == node);
-            let known = of_mesh || MESH_EXTENSIONS.iter().any(|name| rest.starts_with(&format!("extensions/{name}/")));
-            found.require(!member || known, Rule::Transforms, &place, "moves a level instead of the anchor");
-            if node != self.child {
-                continue;
+        for drive in drives.of(self.anchor) {
+            let text = "drives the anchor, the mesh is below it";
+            found.require(!drive.is_of_mesh(), Rule::Follow, drive.place(), text);
+        }
+        for member in self.members() {
+            for drive in drives.of(member) {
+                let text = "moves a level instead of the anchor";
+                found.require(drive.goes_with_mesh(), Rule::Transforms, drive.place(), text);
             }
-            for &level in self.levels.iter().filter(|&&l| rest.starts_with("weights") <= has_targets(output, &nodes[l]))
-            {
-                let twin = |other: &&Value| {
-                    target(other) == Some((level, rest.clone())) && other.get("sampler") == channel.get("sampler")
+        }
+        for drive in drives.of(self.child) {
+            for &level in &self.levels {
+                let wanted = !drive.property.starts_with("weights") || has_targets(output, &nodes[level]);
+                let twin = |other: &Drive<'_>| {
+                    (other.animation, other.property, other.sampler) == (drive.animation, drive.property, drive.sampler)
                 };
+                let driven = drives.of(level).iter().any(twin);
                 let text = format!("drives level 0 but not node {level}");
-                found.require(channels.iter().any(twin), Rule::Follow, &place, text);
+                found.require(driven || !wanted, Rule::Follow, drive.place(), text);
             }
         }
     }
@@ -203,16 +198,6 @@ impl Group {
             found.require(!primitives(level).is_empty(), Rule::Roles, format_args!("nodes[{level}].mesh"), "is empty");
         }
     }
-}
-
-/// Node and property that a channel drives: `(3, "weights")`.
-fn target(channel: &Value) -> Option<(usize, String)> {
-    let target = channel.get("target")?;
-    if let Some(pointer) = target.pointer("/extensions/KHR_animation_pointer/pointer").and_then(Value::as_str) {
-        let (node, rest) = pointer.strip_prefix("/nodes/")?.split_once('/')?;
-        return Some((node.parse().ok()?, rest.to_owned()));
-    }
-    Some((index(target, "node")?, target.get("path")?.as_str()?.to_owned()))
 }
 
 fn has_targets(output: &Document, node: &Value) -> bool {

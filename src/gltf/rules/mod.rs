@@ -3,12 +3,14 @@
 //! Compares an output with its source, knowing only the two documents and the rules, not how the writer works. The
 //! official validator checks neither `MSFT_lod` nor `EXT_mesh_gpu_instancing`, hence this one.
 
+mod drives;
 mod group;
 mod kept;
 mod layout;
 mod roles;
 
 use super::document::Document;
+use drives::Drives;
 use group::Group;
 use serde_json::Value;
 
@@ -61,8 +63,9 @@ pub fn check(source: &Document, output: &Document) -> Vec<Violation> {
     let mut found = Found(Vec::new());
     let groups = Group::find_all(source, output, &mut found);
     kept::check(source, output, &groups, &mut found);
+    let drives = Drives::new(output);
     for group in &groups {
-        group.check(source, output, &mut found);
+        group.check(source, output, &drives, &mut found);
     }
     roles::check(source, output, &groups, &mut found);
     layout::check(source, output, &groups, &mut found);

@@ -97,8 +97,10 @@ fn check_declared(source: &Document, output: &Document, groups: &[Group], found:
 /// Instances that are not in the source: lodbake's own.
 fn check_new_instances(source: &Document, output: &Document, groups: &[Group], found: &mut Found) {
     const INSTANCING: &str = "EXT_mesh_gpu_instancing";
+    let origins: BTreeMap<usize, usize> =
+        groups.iter().flat_map(|group| group.members().map(|member| (member, group.anchor))).collect();
     let in_source = |node: usize| {
-        let origin = groups.iter().find(|group| group.members().any(|m| m == node)).map_or(node, |group| group.anchor);
+        let origin = origins.get(&node).copied().unwrap_or(node);
         array(source, "nodes").get(origin).is_some_and(|node| json::extension(node, INSTANCING).is_some())
     };
     for (i, node) in array(output, "nodes").iter().enumerate() {
