@@ -222,7 +222,13 @@ impl<const M: usize> ErrorMetric for Its<M> {
 
     fn price_at(&self, surface: &Topology, a: u32, b: u32, position: [f64; 3]) -> Option<Price> {
         if self.placement == Placement::Subset {
-            return None;
+            let keep_second = position == surface.positions[b as usize];
+            let (kept, gone) = if keep_second { (b, a) } else { (a, b) };
+            if position != surface.positions[kept as usize] {
+                return None;
+            }
+            let (cost, plane) = self.subset_cost(surface, kept, gone)?;
+            return Some(Price { keep_second, ..self.finish(a, b, &plane, cost, position) });
         }
         let (plane, whole) = self.combined(surface, a, b)?;
         Some(self.finish(a, b, &plane, whole.eval(position), position))

@@ -88,11 +88,16 @@ impl ErrorMetric for Qem {
         Some(self.finish(a, b, best.0, best.1))
     }
 
-    fn price_at(&self, _: &Topology, a: u32, b: u32, position: [f64; 3]) -> Option<Price> {
-        (self.placement == Placement::Optimal).then(|| {
-            let cost = self.combined(a, b).eval(position);
-            self.finish(a, b, cost, position)
-        })
+    fn price_at(&self, surface: &Topology, a: u32, b: u32, position: [f64; 3]) -> Option<Price> {
+        let keep_second = position == surface.positions[b as usize];
+        if self.placement == Placement::Subset {
+            let (kept, gone) = if keep_second { (b, a) } else { (a, b) };
+            if position != surface.positions[kept as usize] || !wedges_fit(surface, kept, gone) {
+                return None;
+            }
+        }
+        let cost = self.combined(a, b).eval(position);
+        Some(Price { keep_second, ..self.finish(a, b, cost, position) })
     }
 
     fn contracted(&mut self, surface: &mut Topology, done: &Contraction) {

@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::mesh::Mesh;
 use crate::mesh::layout::{AttributeScale, Layout};
-use crate::mesh::topology::{Contraction, Topology};
+use crate::mesh::topology::{Contraction, EdgeKind, Topology};
 use crate::metric::its::{EdgeWeights, Its};
 use crate::metric::qem::Qem;
-use crate::metric::{ErrorMetric, Placement};
+use crate::metric::{ErrorMetric, Placement, Price};
 use crate::quadric::lerp;
 use progressive::{Progressive, Recorder};
 use queue::Queue;
@@ -45,6 +45,8 @@ pub struct Settings {
     pub attributes: AttributeScale,
     /// Weights of borders, seams and creases.
     pub edges: EdgeWeights,
+    /// Vertices of open borders stay where they are.
+    pub lock_border: bool,
 }
 
 /// Simplifies `mesh` as far as it goes and returns the recorded sequence.
@@ -52,18 +54,19 @@ pub fn simplify(mesh: &Mesh, settings: &Settings) -> Progressive {
     let layout = Layout::new(mesh, settings.attributes);
     let (mut surface, weld) = Topology::new(mesh, &layout);
     let recorder = Recorder::new(&surface, &layout, weld);
-    build(&mut surface, settings, recorder)
+    let locks = Locks::new(&surface, settings.lock_border);
+    build(&mut surface, settings, locks, recorder)
 }
 
 /// The only place that builds a metric. The number of columns is a compile-time constant of `its`, so that its inner
 /// loops have known lengths.
-fn build(surface: &mut Topology, settings: &Settings, recorder: Recorder) -> Progressive {
+fn build(surface: &mut Topology, settings: &Settings, locks: Locks, recorder: Recorder) -> Progressive {
     if settings.metric == MetricKind::Qem {
         let metric = Qem::new(surface, settings.edges.border, settings.placement);
-        return run(surface, metric, recorder);
+        return run(surface, metric, &locks, recorder);
     }
     // Widths that meshes have: nothing, normals, + one or two texture sets, + colours. Others are padded with zeros.
-    const WIDTHS: [usize; 9] = [0, 2, 3, 5, 7, 9, 12, 16, 32];
+    const WIDTHS: [usize; 6] = [3, 5, 7, 9, 16, 32];
     let width = WIDTHS.into_iter().find(|&width| surface.columns <= width).expect("a layout has at most 32 columns");
     surface.resize_columns(width);
     macro_rules! its {
@@ -71,30 +74,70 @@ fn build(surface: &mut Topology, settings: &Settings, recorder: Recorder) -> Pro
             match width {
                 $($m => {
                     let metric = Its::<$m>::new(surface, settings.edges, settings.placement);
-                    run(surface, metric, recorder)
+                    run(surface, metric, &locks, recorder)
                 })*
                 _ => unreachable!("a width of the list"),
             }
         };
     }
-    its!(0 2 3 5 7 9 12 16 32)
+    its!(3 5 7 9 16 32)
 }
 
-fn run<E: ErrorMetric>(surface: &mut Topology, mut metric: E, mut recorder: Recorder) -> Progressive {
+/// Vertices that must stay where they are.
+struct Locks(Vec<bool>);
+
+impl Locks {
+    /// The ends of all border edges, or none.
+    fn new(surface: &Topology, lock_border: bool) -> Self {
+        let mut held = Vec::new();
+        if lock_border {
+            held.resize(surface.positions.len(), false);
+            for face in &surface.faces {
+                for edge in (0..3).filter(|&edge| face.edges[edge] == EdgeKind::Border) {
+                    held[face.v[edge] as usize] = true;
+                    held[face.v[(edge + 1) % 3] as usize] = true;
+                }
+            }
+        }
+        Self(held)
+    }
+
+    #[inline]
+    fn holds(&self, vertex: u32) -> bool {
+        !self.0.is_empty() && self.0[vertex as usize]
+    }
+
+    /// The metric's price, with a held vertex as the only place to go.
+    #[inline]
+    fn price<E: ErrorMetric>(&self, metric: &E, surface: &Topology, a: u32, b: u32) -> Option<Price> {
+        let price = match (self.holds(a), self.holds(b)) {
+            (false, false) => return metric.price(surface, a, b),
+            (true, true) => return None,
+            (true, false) => metric.price_at(surface, a, b, surface.positions[a as usize]),
+            (false, true) => metric.price_at(surface, a, b, surface.positions[b as usize]),
+        };
+        price.map(|price| Price { keep_second: self.holds(b), ..price })
+    }
+}
+
+fn run<E: ErrorMetric>(surface: &mut Topology, mut metric: E, locks: &Locks, mut recorder: Recorder) -> Progressive {
     let mut queue = Queue::new(surface.positions.len());
     let mut neighbours = Vec::new();
     let mut done = Contraction::default();
     loop {
         let before = surface.alive;
-        fill(surface, &metric, &mut queue);
+        fill(surface, &metric, locks, &mut queue);
         while let Some((a, b, cost)) = queue.pop() {
-            let Some(mut price) = metric.price(surface, a, b) else { continue };
+            let Some(mut price) = locks.price(&metric, surface, a, b) else { continue };
             // Prices are not kept up to date behind the queue's back: a pair is priced again when its turn comes.
             if !queue.is_next(price.cost, cost) {
                 queue.push(a, b, price.cost);
                 continue;
             }
             if !legal::turns_gently(surface, a, b, price.position) {
+                if locks.holds(a) || locks.holds(b) {
+                    continue;
+                }
                 let middle = lerp(surface.positions[a as usize], surface.positions[b as usize], 0.5);
                 let Some(other) = metric.price_at(surface, a, b, middle) else { continue };
                 if !legal::turns_gently(surface, a, b, middle) {
@@ -109,7 +152,7 @@ fn run<E: ErrorMetric>(surface: &mut Topology, mut metric: E, mut recorder: Reco
             queue.merged(kept, gone);
             surface.neighbours(kept, &mut neighbours);
             for &other in &neighbours {
-                if let Some(price) = metric.price(surface, kept, other) {
+                if let Some(price) = locks.price(&metric, surface, kept, other) {
                     queue.push(kept, other, price.cost);
                 }
             }
@@ -121,12 +164,12 @@ fn run<E: ErrorMetric>(surface: &mut Topology, mut metric: E, mut recorder: Reco
     }
 }
 
-fn fill<E: ErrorMetric>(surface: &Topology, metric: &E, queue: &mut Queue) {
+fn fill<E: ErrorMetric>(surface: &Topology, metric: &E, locks: &Locks, queue: &mut Queue) {
     let mut neighbours = Vec::new();
     for a in 0..surface.positions.len() as u32 {
         surface.neighbours(a, &mut neighbours);
         for &b in neighbours.iter().filter(|&&b| a < b) {
-            if let Some(price) = metric.price(surface, a, b) {
+            if let Some(price) = locks.price(metric, surface, a, b) {
                 queue.stage(a, b, price.cost);
             }
         }
