@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::allocate::Allocation;
 use crate::distance::{Surface, largest_distance};
-use crate::mesh::{Level, LevelPrimitive, LevelVertices, Mesh, Primitive};
+use crate::mesh::{Attribute, Level, LevelPrimitive, LevelVertices, Mesh, Primitive};
 use crate::simplify::progressive::Progressive;
 use crate::simplify::replay::{CutPrimitive, Replay};
 
@@ -181,7 +181,7 @@ impl<'a> Cutter<'a> {
             replay: Replay::new(part.mesh, sequence),
             done: 0,
             source: Surface::new(triangles.collect()),
-            radius: crate::mesh::layout::frame(part.mesh).1,
+            radius: crate::mesh::layout::frame(&part.mesh.primitives).1,
         }
     }
 
@@ -252,9 +252,8 @@ impl<'a> Cutter<'a> {
 
     fn shares(&self, source: &Primitive, cut: &CutPrimitive) -> bool {
         let index_size = |vertices: usize| if vertices < usize::from(u16::MAX) { 2 } else { 4 };
-        let vertex_size = |components: usize, size: usize| (components * size).next_multiple_of(4);
         let sets = source.targets.iter().flatten().chain(&source.attributes);
-        let stride: usize = sets.map(|a| vertex_size(a.components, a.format.component.size())).sum();
+        let stride: usize = sets.map(Attribute::row_bytes).sum();
         let shared = cut.indices.len() * index_size(source.count);
         let compact = cut.indices.len() * index_size(cut.wedges.len()) + cut.wedges.len() * stride;
         match self.settings.storage {

@@ -61,7 +61,7 @@ pub struct Layout {
 impl Layout {
     /// The layout of `mesh`.
     pub fn new(mesh: &Mesh, scale: AttributeScale) -> Self {
-        let (center, radius) = frame(mesh);
+        let (center, radius) = frame(&mesh.primitives);
         let mut fields: Vec<Field> = Vec::new();
         for primitive in &mesh.primitives {
             for attribute in &primitive.attributes {
@@ -117,10 +117,10 @@ fn kind(name: &str) -> Option<FieldKind> {
 }
 
 /// Centre and half diagonal of the bounding box of all positions.
-pub fn frame(mesh: &Mesh) -> ([f64; 3], f64) {
+pub fn frame<'a>(primitives: impl IntoIterator<Item = &'a Primitive>) -> ([f64; 3], f64) {
     let mut low = [f64::INFINITY; 3];
     let mut high = [f64::NEG_INFINITY; 3];
-    for primitive in &mesh.primitives {
+    for primitive in primitives {
         for p in primitive.positions() {
             for i in 0..3 {
                 low[i] = low[i].min(f64::from(p[i]));
@@ -128,7 +128,7 @@ pub fn frame(mesh: &Mesh) -> ([f64; 3], f64) {
             }
         }
     }
-    if !(low[0] <= high[0]) {
+    if high[0] < low[0] {
         return ([0.0; 3], 1.0);
     }
     let center = [0, 1, 2].map(|i| low[i] + (high[i] - low[i]) * 0.5);

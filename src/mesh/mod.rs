@@ -92,6 +92,13 @@ pub struct Attribute {
     pub values: Vec<f32>,
 }
 
+impl Attribute {
+    /// Bytes of one vertex's values in storage, padded to a multiple of four.
+    pub fn row_bytes(&self) -> usize {
+        (self.components * self.format.component.size()).next_multiple_of(4)
+    }
+}
+
 /// One primitive: a list of triangles over its own vertices.
 ///
 /// Strips and fans are converted to lists when read. The order of `attributes` is by name, so that two files that
@@ -186,7 +193,31 @@ pub struct Level {
     pub error: f64,
 }
 
+impl LevelPrimitive {
+    /// Bytes of its arrays as they are written: indices of two bytes where they fit, rows of vertices padded to four.
+    pub fn bytes(&self) -> usize {
+        let vertices = match &self.vertices {
+            LevelVertices::Source => self.indices.iter().max().map_or(0, |&most| most as usize + 1),
+            LevelVertices::Own(own) => own.count,
+        };
+        let index_size = if vertices < usize::from(u16::MAX) { 2 } else { 4 };
+        let own = match &self.vertices {
+            LevelVertices::Source => 0,
+            LevelVertices::Own(own) => {
+                own.count
+                    * own.attributes.iter().chain(own.targets.iter().flatten()).map(Attribute::row_bytes).sum::<usize>()
+            }
+        };
+        self.indices.len() * index_size + own
+    }
+}
+
 impl Level {
+    /// Bytes of all primitives.
+    pub fn bytes(&self) -> usize {
+        self.primitives.iter().map(LevelPrimitive::bytes).sum()
+    }
+
     /// Number of triangles of all primitives.
     pub fn triangles(&self) -> usize {
         self.primitives.iter().map(|p| p.indices.len() / 3).sum()

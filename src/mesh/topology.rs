@@ -75,6 +75,18 @@ impl std::ops::Deref for WedgePairs {
     }
 }
 
+/// Where the vertex that stays is now.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Place {
+    /// Where it was, bit for bit.
+    #[default]
+    Kept,
+    /// Where the vertex that is gone was, bit for bit.
+    Gone,
+    /// Elsewhere.
+    New,
+}
+
 /// A contraction that has been done: `gone` was merged into `kept`.
 #[derive(Clone, Debug, Default)]
 pub struct Contraction {
@@ -84,6 +96,8 @@ pub struct Contraction {
     pub gone: u32,
     /// Where the new position lies along the edge from `kept` to `gone`, 0…1.
     pub t: f64,
+    /// Whether that is one of the ends.
+    pub place: Place,
     /// Wedges joined by a face on the edge: `[stays, gone]`.
     pub merged: Vec<[u32; 2]>,
     /// Number of faces that vanished.
@@ -296,6 +310,11 @@ impl Topology {
         let squared = dot(along, along);
         done.t = if squared > 0.0 { (dot(sub(position, a), along) / squared).clamp(0.0, 1.0) } else { 0.0 };
         (done.kept, done.gone) = (kept, gone);
+        done.place = match position {
+            p if p == a => Place::Kept,
+            p if p == b => Place::Gone,
+            _ => Place::New,
+        };
         self.merge_wedges(kept, gone, &mut done.merged);
         done.dead_faces = self.merge_rings(kept, gone);
         self.alive -= done.dead_faces;

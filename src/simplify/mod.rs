@@ -7,6 +7,8 @@ mod legal;
 pub mod progressive;
 pub mod replay;
 mod queue;
+#[cfg(test)]
+mod tests;
 
 use serde::{Deserialize, Serialize};
 
@@ -53,7 +55,7 @@ pub struct Settings {
 pub fn simplify(mesh: &Mesh, settings: &Settings) -> Progressive {
     let layout = Layout::new(mesh, settings.attributes);
     let (mut surface, weld) = Topology::new(mesh, &layout);
-    let recorder = Recorder::new(&surface, &layout, weld);
+    let recorder = Recorder::new(mesh, &surface, &layout, weld);
     let locks = Locks::new(&surface, settings.lock_border);
     build(&mut surface, settings, locks, recorder)
 }
@@ -122,44 +124,62 @@ impl Locks {
 
 fn run<E: ErrorMetric>(surface: &mut Topology, mut metric: E, locks: &Locks, mut recorder: Recorder) -> Progressive {
     let mut queue = Queue::new(surface.positions.len());
-    let mut neighbours = Vec::new();
+    let (mut neighbours, mut second) = (Vec::new(), Vec::new());
     let mut done = Contraction::default();
-    loop {
-        let before = surface.alive;
-        fill(surface, &metric, locks, &mut queue);
-        while let Some((a, b, cost)) = queue.pop() {
-            let Some(mut price) = locks.price(&metric, surface, a, b) else { continue };
-            // Prices are not kept up to date behind the queue's back: a pair is priced again when its turn comes.
-            if !queue.is_next(price.cost, cost) {
-                queue.push(a, b, price.cost);
-                continue;
-            }
-            if !legal::turns_gently(surface, a, b, price.position) {
-                if locks.holds(a) || locks.holds(b) {
-                    continue;
-                }
-                let middle = lerp(surface.positions[a as usize], surface.positions[b as usize], 0.5);
-                let Some(other) = metric.price_at(surface, a, b, middle) else { continue };
-                if !legal::turns_gently(surface, a, b, middle) {
-                    continue;
-                }
-                price = other;
-            }
-            let (kept, gone) = if price.keep_second { (b, a) } else { (a, b) };
-            surface.contract(kept, gone, price.position, &mut done);
-            metric.contracted(surface, &done);
-            recorder.record(surface, &done, &price);
-            queue.merged(kept, gone);
-            surface.neighbours(kept, &mut neighbours);
-            for &other in &neighbours {
-                if let Some(price) = locks.price(&metric, surface, kept, other) {
-                    queue.push(kept, other, price.cost);
-                }
+    // Ends of pairs that were illegal when their turn came: tried again when something beside them changes.
+    let mut refused = vec![false; surface.positions.len()];
+    fill(surface, &metric, locks, &mut queue);
+    while let Some((a, b, entered)) = queue.pop() {
+        let Some(price) = locks.price(&metric, surface, a, b) else { continue };
+        // Prices are not kept up to date behind the queue's back: a pair is priced again when its turn comes.
+        if !queue.is_next(price.cost, entered) {
+            queue.push(a, b, price.cost);
+            continue;
+        }
+        let Some(price) = legal_price(surface, &metric, locks, [a, b], price) else {
+            (refused[a as usize], refused[b as usize]) = (true, true);
+            continue;
+        };
+        let (kept, gone) = if price.keep_second { (b, a) } else { (a, b) };
+        surface.contract(kept, gone, price.position, &mut done);
+        metric.contracted(surface, &done);
+        recorder.record(surface, &done, &price);
+        queue.merged(kept, gone);
+        surface.neighbours(kept, &mut neighbours);
+        push_all(surface, &metric, locks, &mut queue, kept, &neighbours);
+        for &vertex in &neighbours {
+            if std::mem::take(&mut refused[vertex as usize]) {
+                surface.neighbours(vertex, &mut second);
+                push_all(surface, &metric, locks, &mut queue, vertex, &second);
             }
         }
-        // Pairs that were illegal when their turn came may be legal now.
-        if surface.alive == before || surface.alive == 0 {
-            return recorder.finish();
+    }
+    recorder.finish()
+}
+
+/// The price if the contraction is legal; else that of contracting to the middle if that is; else `None`.
+fn legal_price<E: ErrorMetric>(
+    s: &Topology,
+    metric: &E,
+    locks: &Locks,
+    [a, b]: [u32; 2],
+    price: Price,
+) -> Option<Price> {
+    if legal::turns_gently(s, a, b, price.position) {
+        return Some(price);
+    }
+    if locks.holds(a) || locks.holds(b) {
+        return None;
+    }
+    let middle = lerp(s.positions[a as usize], s.positions[b as usize], 0.5);
+    let price = metric.price_at(s, a, b, middle)?;
+    legal::turns_gently(s, a, b, middle).then_some(price)
+}
+
+fn push_all<E: ErrorMetric>(s: &Topology, metric: &E, locks: &Locks, queue: &mut Queue, vertex: u32, others: &[u32]) {
+    for &other in others {
+        if let Some(price) = locks.price(metric, s, vertex, other) {
+            queue.push(vertex, other, price.cost);
         }
     }
 }

@@ -5,8 +5,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::mesh::Mesh;
 use crate::mesh::layout::Layout;
-use crate::mesh::topology::{Contraction, Topology};
+use crate::mesh::topology::{Contraction, Place, Topology};
 use crate::mesh::weld::Weld;
 use crate::metric::Price;
 
@@ -81,11 +82,14 @@ pub struct Recorder {
     unscale: Vec<f64>,
     columns: usize,
     cost_scale: f64,
+    /// Where each vertex is now, object space. Source positions do not pass through the unit frame, which could cost
+    /// them their last bit.
+    positions: Vec<[f32; 3]>,
 }
 
 impl Recorder {
     /// Starts a sequence on an untouched surface.
-    pub fn new(surface: &Topology, layout: &Layout, weld: Weld) -> Self {
+    pub fn new(mesh: &Mesh, surface: &Topology, layout: &Layout, weld: Weld) -> Self {
         let primitives = weld.stored_start.len();
         let mut unscale = vec![0.0; primitives * layout.columns];
         for field in &layout.fields {
@@ -105,9 +109,20 @@ impl Recorder {
         };
         // Area times squared distance: the fourth power of the unit.
         let squared = layout.radius * layout.radius;
-        let columns = layout.columns;
-        let wedge_primitive = weld.wedge_primitive;
-        Self { out, layout: layout.clone(), wedge_primitive, unscale, columns, cost_scale: squared * squared }
+        let mut positions = vec![[0.0; 3]; weld.vertices];
+        for (wedge, &vertex) in weld.wedge_vertex.iter().enumerate() {
+            let primitive = &mesh.primitives[weld.wedge_primitive[wedge] as usize];
+            positions[vertex as usize] = primitive.positions()[weld.wedge_source[wedge] as usize];
+        }
+        Self {
+            out,
+            layout: layout.clone(),
+            wedge_primitive: weld.wedge_primitive,
+            unscale,
+            columns: layout.columns,
+            cost_scale: squared * squared,
+            positions,
+        }
     }
 
     /// Adds a contraction that has been done, with its wedge values set.
@@ -119,10 +134,16 @@ impl Recorder {
             let values = surface.value(wedge).iter().zip(&unscale[..self.columns]);
             self.out.set_values.extend(values.map(|(value, unscale)| (value * unscale) as f32));
         }
+        let position = match done.place {
+            Place::Kept => self.positions[done.kept as usize],
+            Place::Gone => self.positions[done.gone as usize],
+            Place::New => self.layout.to_object(surface.positions[done.kept as usize]),
+        };
+        self.positions[done.kept as usize] = position;
         self.out.steps.push(Step {
             kept: done.kept,
             gone: done.gone,
-            position: self.layout.to_object(surface.positions[done.kept as usize]),
+            position,
             t: done.t as f32,
             cost: (price.cost * self.cost_scale) as f32,
             error: (price.error * self.layout.radius) as f32,
