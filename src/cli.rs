@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
-use crate::command::{CacheChoice, Context, Exit, OutputClosed, UsageError, completions};
+use crate::command::{CacheChoice, Context, Exit, OutputClosed, UsageError, bake, completions};
 use crate::config::ConfigError;
 use crate::gltf::document::DocumentError;
 use crate::progress::{JsonLines, Lines, Paint, Reporter, Terminal, Verbosity};
@@ -80,6 +80,8 @@ enum ColorChoice {
 /// What to do.
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Bake the scenes of a pipeline
+    Bake(bake::Bake),
     /// Write completions for a shell to standard output
     Completions(completions::Completions),
 }
@@ -98,6 +100,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> Exit {
     };
     let context = cli.global.settle();
     let done = match &cli.command {
+        Command::Bake(command) => command.run(&context),
         Command::Completions(command) => command.run(Cli::command(), &context),
     };
     match done {

@@ -293,6 +293,10 @@ fn measured(source: &Surface, mesh: &Mesh, replay: &mut Replay, cuts: &[CutPrimi
     let middles = triangles.iter().map(|t| [0, 1, 2].map(|i| (t[0][i] + t[1][i] + t[2][i]) / 3.0));
     let points = middles.chain(triangles.iter().map(|t| t[0]));
     let back = largest_distance(thinned(points, triangles.len() * 2), source, 0.0);
+    if triangles.is_empty() {
+        // Nothing is left of it: as far off as it was large.
+        return 2.0 * crate::mesh::layout::frame(&mesh.primitives).1;
+    }
     let level = Surface::new(triangles.clone());
     let total = mesh.vertices();
     let vertices = mesh.primitives.iter().flat_map(used_positions);

@@ -3,6 +3,7 @@
 //! A command is a struct of its own arguments ([`clap::Args`], so that its help stands beside its code) with
 //! `run(&self, &Context) -> anyhow::Result<Exit>`. It knows nothing of other commands' arguments.
 
+pub mod bake;
 pub mod completions;
 
 use std::io::{self, Write};

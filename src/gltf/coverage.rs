@@ -77,6 +77,13 @@ impl Thresholds {
     }
 }
 
+/// Screen coverage and switching distance of each level of a single object, finest first: what `add_levels` writes for
+/// it. `errors` and `radius` are lengths in the mesh's units.
+pub fn switches(radius: f64, errors: &[f64], settings: &EmitSettings) -> Vec<(f64, f64)> {
+    let thresholds = Thresholds::new(Extent { radius, scale: 1.0, batch: false }, errors, settings);
+    thresholds.coverage.into_iter().zip(thresholds.distances).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

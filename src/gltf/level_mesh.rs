@@ -39,6 +39,16 @@ impl Role {
     }
 }
 
+/// Its vertices exist only after decoding a whole primitive.
+const DRACO: &str = "KHR_draco_mesh_compression";
+
+/// Whether levels cannot refer to the vertices of a mesh of the source, because a primitive keeps them compressed.
+pub fn is_sealed(document: &Document, mesh: usize) -> bool {
+    let meshes = document.array("meshes").unwrap_or_default();
+    let primitives = meshes.get(mesh).and_then(|mesh| mesh.get("primitives")?.as_array());
+    primitives.into_iter().flatten().any(|primitive| json::extension(primitive, DRACO).is_some())
+}
+
 /// Writes meshes of levels into a document.
 pub(super) struct LevelWriter<'d> {
     pub(super) document: &'d mut Document,
@@ -208,7 +218,6 @@ impl<'d> LevelWriter<'d> {
     /// Number of the source's vertices, if a level may share them. Compressed with Draco they exist only after
     /// decoding, and even where the accessors have data of their own, its order need not be the decoder's.
     fn source_vertices(&self, role: Role, number: usize, source: &Value) -> Result<usize, WriteError> {
-        const DRACO: &str = "KHR_draco_mesh_compression";
         if json::extension(source, DRACO).is_some() {
             return Err(role.error(number, LevelProblem::Sealed(DRACO.to_owned())));
         }

@@ -26,6 +26,8 @@ use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+pub use super::coverage::switches;
+pub use super::level_mesh::is_sealed;
 pub use super::notes::Note;
 pub use super::write::{NewBuffer, WriteError};
 

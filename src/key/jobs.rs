@@ -112,7 +112,8 @@ fn write_simplify(settings: &SimplifySettings, parts: MeshParts, to: &mut dyn Ma
     to.flag("lock_border", *lock_border);
 }
 
-fn write_chain(settings: &ChainSettings, to: &mut dyn ManifestWriter) {
+/// The settings that decide how sequences are cut.
+pub fn write_chain(settings: &ChainSettings, to: &mut dyn ManifestWriter) {
     let ChainSettings { levels, storage, vertex_cache } = settings;
     to.text("storage", storage.name());
     to.flag("vertex_cache", *vertex_cache);

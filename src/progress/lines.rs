@@ -115,7 +115,7 @@ impl Reporter for Lines {
                 self.tell(Verbosity::Verbose, &format!("found {}", plural(*files, "scene")));
             }
             Event::PlanFinished { found, distinct, jobs, triangles } => {
-                self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner).jobs.total = *jobs;
+                self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner).jobs.total += *jobs;
                 if *jobs > 0 {
                     let (found, distinct, triangles) =
                         (plural(*found, "mesh"), count(*distinct), plural(*triangles, "triangle"));
@@ -140,6 +140,10 @@ impl Reporter for Lines {
                 let how = if *cached { "from the cache" } else { "baked" };
                 self.tell(Verbosity::Verbose, &format!("{how} {mesh}"));
                 self.step("meshes", |tally| &mut tally.jobs);
+            }
+            Event::ScanFailed { error } => self.tell(Verbosity::Quiet, &self.paint.error_lines(error, None)),
+            Event::SceneVanished { path } => {
+                self.tell(Verbosity::Normal, &format!("removed the outputs of {path}, which is gone"));
             }
             Event::ScenePlanned { path, reason, jobs } => {
                 self.tell(Verbosity::Normal, &format!("would bake {path}: {reason} ({})", plural(*jobs, "job")));

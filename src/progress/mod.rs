@@ -104,6 +104,16 @@ pub enum Event {
         #[serde(skip_serializing_if = "Option::is_none")]
         hint: Option<String>,
     },
+    /// A file or folder that could not be taken as a scene.
+    ScanFailed {
+        /// What went wrong, with the path.
+        error: String,
+    },
+    /// A scene is no longer there (or is skipped now): what was written for it is removed.
+    SceneVanished {
+        /// Scene file.
+        path: String,
+    },
     /// Something a person should know that does not stop the work.
     Warning {
         /// What is odd.

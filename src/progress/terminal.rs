@@ -164,6 +164,8 @@ impl Reporter for Terminal {
             Event::PlanFinished { jobs, triangles, .. } => self.planned(*jobs, *triangles),
             Event::JobStarted { mesh, triangles } => self.job_started(mesh, *triangles),
             Event::JobFinished { mesh, triangles, cached } => self.job_finished(mesh, *triangles, *cached),
+            Event::ScanFailed { error } => self.say(&self.paint.error_lines(error, None)),
+            Event::SceneVanished { path } => self.say(&format!("removed the outputs of {path}, which is gone")),
             Event::ScenePlanned { path, reason, jobs } => {
                 self.say(&format!("would bake {path}: {reason} ({})", plural(*jobs, "job")));
                 self.scene_done();

@@ -1,0 +1,163 @@
+//! What a report says of one scene, made where the scene is baked and remembered by the index.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::wave::ReadScene;
+use crate::gltf::scene::SourceMesh;
+use crate::key::JobKey;
+use crate::lod::{Chain, ChainLevel};
+use crate::mesh::{Level, LevelVertices};
+use crate::plan::MeshPlan;
+use crate::report::{LevelRecord, MeshRecord, PieceLevel, PieceRecord, Problem, SceneRecord, Severity, Status};
+use crate::scan::SceneFile;
+
+/// The record of a scene with its problems.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SceneFacts {
+    pub record: SceneRecord,
+    pub problems: Vec<Problem>,
+}
+
+/// First byte of remembered facts; another one means another shape of [`SceneFacts`].
+const VERSION: u8 = 1;
+
+/// For the index.
+pub fn to_bytes(facts: &SceneFacts) -> Vec<u8> {
+    let mut bytes = vec![VERSION];
+    serde_json::to_writer(&mut bytes, facts).expect("facts are plain data");
+    bytes
+}
+
+/// From the index; `None` if they are of another version.
+pub fn from_bytes(bytes: &[u8]) -> Option<SceneFacts> {
+    let (&version, json) = bytes.split_first()?;
+    if version != VERSION {
+        return None;
+    }
+    serde_json::from_slice(json).ok()
+}
+
+impl SceneFacts {
+    fn without_output(file: &SceneFile, status: Status, problems: Vec<Problem>) -> Self {
+        let record = SceneRecord {
+            path: file.relative.clone(),
+            status,
+            settings: None,
+            bytes_in: file.stat.size,
+            bytes_out: 0,
+            outputs: Vec::new(),
+            meshes: Vec::new(),
+        };
+        Self { record, problems }
+    }
+
+    /// Of a scene that a setting leaves out.
+    pub fn skipped(file: &SceneFile) -> Self {
+        Self::without_output(file, Status::Skipped, Vec::new())
+    }
+
+    /// Of a scene that could not be baked.
+    pub fn failed(file: &SceneFile, problem: Problem) -> Self {
+        Self::without_output(file, Status::Failed, vec![problem])
+    }
+}
+
+/// A warning at a place of a scene.
+pub fn warning(scene: &str, place: &str, cause: &str) -> Problem {
+    Problem {
+        scene: Some(scene.to_owned()),
+        severity: Severity::Warning,
+        place: place.to_owned(),
+        cause: cause.to_owned(),
+        hint: None,
+    }
+}
+
+/// The records of all meshes of a scene. `switches` tells screen coverage and distance of the levels of a mesh from its
+/// radius and the levels' errors.
+pub fn meshes(
+    scene: &ReadScene,
+    chains: &BTreeMap<JobKey, Arc<Chain>>,
+    switches: impl Fn(f64, &[f64]) -> Vec<(f64, f64)>,
+) -> Vec<MeshRecord> {
+    let record = |source: &SourceMesh| {
+        let radius = scene.radii[source.index];
+        let (chain, notes) = match &scene.plans[source.index] {
+            MeshPlan::Chain(key) => (chains.get(key).map(|chain| &**chain), Vec::new()),
+            MeshPlan::Alone(why) => (None, vec![format!("no levels: {why}")]),
+        };
+        MeshRecord {
+            index: source.index as u64,
+            name: source.name.clone(),
+            instances: scene.instances[source.index],
+            triangles: source.triangles() as u64,
+            vertices: source.triangle_primitives().map(|(_, p)| p.count as u64).sum(),
+            radius,
+            pieces: pieces(scene, source, chain),
+            levels: chain.map_or_else(Vec::new, |chain| {
+                let errors: Vec<f64> = chain.levels.iter().map(|level| level.error).collect();
+                let switches = switches(radius, &errors);
+                chain.levels.iter().zip(switches).map(|(level, at)| level_record(scene, level, radius, at)).collect()
+            }),
+            notes,
+        }
+    };
+    scene.scene.meshes.iter().map(record).collect()
+}
+
+fn pieces(scene: &ReadScene, source: &SourceMesh, chain: Option<&Chain>) -> Vec<PieceRecord> {
+    let subs = scene.sub_meshes[source.index].iter().enumerate();
+    subs.map(|(part, sub)| {
+        let members = || source.triangle_primitives().filter(|(index, _)| sub.primitives.contains(index));
+        PieceRecord {
+            hash: sub.hash,
+            primitives: sub.primitives.iter().map(|&p| p as u64).collect(),
+            triangles: members().map(|(_, p)| p.triangles() as u64).sum(),
+            vertices: members().map(|(_, p)| p.count as u64).sum(),
+            levels: chain.map_or_else(Vec::new, |chain| piece_levels(chain, part)),
+        }
+    })
+    .collect()
+}
+
+fn level_record(scene: &ReadScene, level: &ChainLevel, radius: f64, (coverage, distance): (f64, f64)) -> LevelRecord {
+    LevelRecord {
+        number: level.target as u64 + 1,
+        target: scene.todo.settings.chain.levels[level.target],
+        triangles: level.triangles as u64,
+        vertices: level.parts.iter().flatten().map(vertices).sum(),
+        bytes: level.parts.iter().flatten().map(|part| part.bytes() as u64).sum(),
+        error: level.error,
+        error_of_radius: if 0.0 < radius { level.error / radius } else { 0.0 },
+        coverage,
+        distance,
+        stop: level.stop.into(),
+    }
+}
+
+fn piece_levels(chain: &Chain, part: usize) -> Vec<PieceLevel> {
+    let levels = chain.levels.iter();
+    levels
+        .filter_map(|level| {
+            let piece = level.parts[part].as_ref()?;
+            Some(PieceLevel { triangles: piece.triangles() as u64, error: piece.error })
+        })
+        .collect()
+}
+
+/// Vertices that a level uses, its own or the source's.
+fn vertices(level: &Level) -> u64 {
+    let count = |p: &crate::mesh::LevelPrimitive| match &p.vertices {
+        LevelVertices::Own(own) => own.count,
+        LevelVertices::Source => {
+            let mut used = p.indices.clone();
+            used.sort_unstable();
+            used.dedup();
+            used.len()
+        }
+    };
+    level.primitives.iter().map(count).sum::<usize>() as u64
+}

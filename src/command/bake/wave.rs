@@ -1,0 +1,423 @@
+//! One wave of scenes: read and identify, plan, work, write.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::Session;
+use super::record::{self, SceneFacts};
+use super::survey::Todo;
+use crate::cache::{Bucket, Cache, Lookup};
+use crate::config::Format;
+use crate::emit::{Content, Emission, Emitted, EmittedFile, OutputFolder};
+use crate::gltf::dependencies::{Dependency, DependencyKind, dependencies};
+use crate::gltf::document::{Container, Document};
+use crate::gltf::lod::{MeshLevel, MeshLevels, PrimitiveLevel, WriteError, add_levels, is_sealed, switches};
+use crate::gltf::package::Package;
+use crate::gltf::scene::{Scene, SourceMesh};
+use crate::gltf::{instancing, read};
+use crate::identify::instances::mesh_uses;
+use crate::identify::{SubMesh, sub_meshes};
+use crate::index::{self, Seen};
+use crate::key::JobKey;
+use crate::lod::Chain;
+use crate::mesh::hash::MeshHash;
+use crate::mesh::layout::frame;
+use crate::mesh::{Level, LevelPrimitive};
+use crate::obj;
+use crate::plan::{MeshPlan, Plan};
+use crate::progress::Event;
+use crate::report::{OutputRecord, Problem, SceneRecord, Severity, Status};
+use crate::scan::SceneFile;
+use crate::work::work;
+
+/// Source bytes of one wave: what is in memory at a time is a small multiple of it, or of the largest scene.
+const WAVE_BYTES: u64 = 256 << 20;
+
+/// Splits scenes into waves, in order.
+pub fn waves(todo: Vec<Todo>) -> Vec<Vec<Todo>> {
+    let mut waves: Vec<Vec<Todo>> = Vec::new();
+    let mut bytes = u64::MAX;
+    for scene in todo {
+        let size = scene.file.stat.size;
+        bytes = bytes.saturating_add(size);
+        if WAVE_BYTES < bytes {
+            waves.push(Vec::new());
+            bytes = size;
+        }
+        waves.last_mut().expect("the first scene opens a wave").push(scene);
+    }
+    waves
+}
+
+/// A scene that was read and identified.
+pub struct ReadScene {
+    pub todo: Todo,
+    pub scene: Scene,
+    /// By mesh.
+    pub sub_meshes: Vec<Vec<SubMesh>>,
+    /// By mesh: nodes that show it.
+    pub instances: Vec<u64>,
+    /// By mesh: radius of its bounding sphere.
+    pub radii: Vec<f64>,
+    /// By mesh.
+    pub plans: Vec<MeshPlan>,
+    seen: Seen,
+    dependencies: Vec<index::Dependency>,
+    /// Scene file and buffers.
+    bytes: u64,
+}
+
+/// Why a scene failed.
+struct Failure {
+    file: SceneFile,
+    cause: String,
+    hint: Option<String>,
+}
+
+impl Session<'_> {
+    /// Reads, identifies and plans a wave. Scenes that cannot be read are told and left out.
+    fn read_wave(&mut self, wave: Vec<Todo>) -> (Vec<ReadScene>, Plan) {
+        let reporter = &self.context.reporter;
+        let read: Vec<Result<ReadScene, Failure>> = wave
+            .into_par_iter()
+            .map(|todo| {
+                reporter.event(&Event::SceneStarted { path: todo.file.relative.clone() });
+                let scene = read_scene(todo)?;
+                let meshes = scene.sub_meshes.iter().map(|subs| subs.len() as u64).sum();
+                let path = scene.todo.file.relative.clone();
+                reporter.event(&Event::SceneRead { path, bytes: scene.bytes, meshes });
+                Ok(scene)
+            })
+            .collect();
+        let mut plan = Plan::default();
+        let mut scenes = Vec::new();
+        for result in read {
+            match result {
+                Ok(mut scene) => {
+                    self.summary.scene_bytes_read += scene.bytes;
+                    let meshes = scene.scene.meshes.iter().zip(&scene.sub_meshes);
+                    scene.plans = meshes
+                        .map(|(source, subs)| {
+                            let is_sealed = is_sealed(&scene.scene.document, source.index);
+                            plan.add(source, subs, is_sealed, &scene.todo.settings)
+                        })
+                        .collect();
+                    scenes.push(scene);
+                }
+                Err(failure) => self.fail(failure),
+            }
+        }
+        self.context.reporter.event(&Event::PlanFinished {
+            found: scenes.iter().flat_map(|s| &s.sub_meshes).map(|subs| subs.len() as u64).sum(),
+            distinct: scenes
+                .iter()
+                .flat_map(|s| s.sub_meshes.iter().flatten())
+                .map(|s| s.hash)
+                .collect::<BTreeSet<_>>()
+                .len() as u64,
+            jobs: plan.sequences.len() as u64,
+            triangles: plan.sequences.values().map(|task| task.mesh.triangles() as u64).sum(),
+        });
+        (scenes, plan)
+    }
+
+    /// Reads a wave and tells what would be done with it.
+    pub fn plan_only(&mut self, wave: Vec<Todo>) {
+        let (scenes, plan) = self.read_wave(wave);
+        for scene in scenes {
+            let chains: BTreeSet<JobKey> = scene.chain_keys().collect();
+            let wanted = chains.iter().filter(|key| !is_cached(&self.cache, Bucket::Chains, key));
+            let sequences: BTreeSet<JobKey> =
+                wanted.flat_map(|key| plan.chains[key].parts.iter().filter_map(|part| part.sequence)).collect();
+            let jobs = sequences.iter().filter(|key| !is_cached(&self.cache, Bucket::Sequences, key)).count();
+            let (path, reason) = (scene.todo.file.relative.clone(), scene.todo.reason.clone());
+            self.context.reporter.event(&Event::ScenePlanned { path, reason, jobs: jobs as u64 });
+            self.summary.jobs += jobs as u64;
+            self.summary.baked += 1;
+        }
+    }
+
+    /// Bakes a wave.
+    pub fn bake_wave(&mut self, wave: Vec<Todo>, output: &OutputFolder) {
+        let (scenes, plan) = self.read_wave(wave);
+        let baked = work(&plan, &self.cache, &*self.context.reporter);
+        self.summary.jobs += baked.jobs as u64;
+        self.summary.cache_hits += baked.hits as u64;
+        for warning in &baked.warnings {
+            self.warn_run(warning);
+        }
+        let root = &self.pipeline.output.path;
+        let reporter = &self.context.reporter;
+        let written: Vec<Result<Written, Failure>> = scenes
+            .into_par_iter()
+            .map(|scene| {
+                let written = write_scene(scene, &baked.chains, output, root)?;
+                let path = written.todo.file.relative.clone();
+                let changed = 0 < written.outputs_written;
+                reporter.event(&Event::SceneWritten { path, bytes: written.facts.record.bytes_out, changed });
+                Ok(written)
+            })
+            .collect();
+        for result in written {
+            match result {
+                Ok(written) => self.take_written(written),
+                Err(failure) => self.fail(failure),
+            }
+        }
+    }
+
+    fn take_written(&mut self, written: Written) {
+        let Written { todo, mut facts, bake, outputs_written } = written;
+        match facts.record.status {
+            Status::Copied => self.summary.copied += 1,
+            _ => self.summary.baked += 1,
+        }
+        self.summary.outputs_written += outputs_written;
+        for problem in &facts.problems {
+            self.summary.warnings += 1;
+            let place = if problem.place.is_empty() { String::new() } else { format!("{}: ", problem.place) };
+            let message = format!("`{}`: {place}{}", todo.file.relative, problem.cause);
+            self.context.reporter.event(&Event::Warning { message, hint: problem.hint.clone() });
+        }
+        if todo.settings != self.pipeline.settings() {
+            facts.record.settings = Some(todo.settings.clone());
+        }
+        let bake = index::Bake { facts: record::to_bytes(&facts), ..bake };
+        self.index.record(&todo.file.relative, &todo.key, bake);
+        self.scenes.insert(todo.file.relative.clone(), facts);
+    }
+
+    fn fail(&mut self, failure: Failure) {
+        let Failure { file, cause, hint } = failure;
+        self.summary.failed += 1;
+        let (path, error) = (file.relative.clone(), cause.clone());
+        self.context.reporter.event(&Event::SceneFailed { path, error, hint: hint.clone() });
+        let scene = Some(file.relative.clone());
+        let problem = Problem { scene, severity: Severity::Error, place: String::new(), cause, hint };
+        self.index.forget(&file.relative);
+        self.scenes.insert(file.relative.clone(), SceneFacts::failed(&file, problem));
+    }
+}
+
+impl ReadScene {
+    fn chain_keys(&self) -> impl Iterator<Item = JobKey> + '_ {
+        self.plans.iter().filter_map(|plan| match plan {
+            MeshPlan::Chain(key) => Some(*key),
+            MeshPlan::Alone(_) => None,
+        })
+    }
+}
+
+fn read_scene(todo: Todo) -> Result<ReadScene, Failure> {
+    let file = &todo.file;
+    let failure =
+        |cause: String, hint: Option<&str>| Failure { file: file.clone(), cause, hint: hint.map(str::to_owned) };
+    let base = file.path.parent().unwrap_or(Path::new(""));
+    let is_obj = is_obj(&file.path);
+    // Files are looked at before they are read: one that changes in between is found by the next bake.
+    let bytes = std::fs::read(&file.path)
+        .map_err(|error| failure(format!("failed to read `{}`: {error}", file.path.display()), None))?;
+    let seen = Seen::of(file.stat, &bytes);
+    let named = Document::parse(&bytes).map(|document| dependencies(&document, base)).unwrap_or_default();
+    let mut beside = see(base, &named);
+    let scene = if is_obj { obj::read(&file.path) } else { read::read(&file.path) };
+    let scene = scene.map_err(|error| failure(error.to_string(), error.hint()))?;
+    if is_obj {
+        beside = see(base, &scene.dependencies);
+    }
+    let sub_meshes: Vec<Vec<SubMesh>> = scene.meshes.par_iter().map(sub_meshes).collect();
+    let uses = mesh_uses(&scene.document)
+        .map_err(|error| failure(format!("failed to read `{}`: {error}", file.path.display()), error.hint()))?;
+    let buffers: u64 = (scene.dependencies.iter())
+        .filter(|d| d.kind == DependencyKind::Buffer)
+        .filter_map(|d| beside.iter().find(|(path, _)| *path == d.path)?.1.seen.as_ref())
+        .map(|seen| seen.stat.size)
+        .sum();
+    Ok(ReadScene {
+        instances: uses.iter().map(|used| used.instances).collect(),
+        radii: scene.meshes.iter().map(radius).collect(),
+        plans: Vec::new(),
+        bytes: bytes.len() as u64 + buffers,
+        sub_meshes,
+        seen,
+        dependencies: beside.into_iter().map(|(_, dependency)| dependency).collect(),
+        scene,
+        todo,
+    })
+}
+
+fn is_cached(cache: &Cache, bucket: Bucket, key: &JobKey) -> bool {
+    matches!(cache.get(bucket, key), Lookup::Hit(_))
+}
+
+/// State and content of files beside a scene, by path.
+fn see(base: &Path, files: &[Dependency]) -> Vec<(PathBuf, index::Dependency)> {
+    let relative = |path: &Path| {
+        let below = path.strip_prefix(base).unwrap_or(path);
+        below.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
+    };
+    let mut seen: Vec<(PathBuf, index::Dependency)> = files
+        .iter()
+        .map(|d| (d.path.clone(), index::Dependency { relative: relative(&d.path), seen: Seen::read(&d.path).ok() }))
+        .collect();
+    seen.sort_by(|a, b| a.0.cmp(&b.0));
+    seen.dedup_by(|a, b| a.0 == b.0);
+    seen
+}
+
+/// Radius of the bounding sphere of a mesh: half the diagonal of the box of its triangles' primitives.
+fn radius(source: &SourceMesh) -> f64 {
+    frame(source.triangle_primitives().map(|(_, primitive)| primitive)).1
+}
+
+/// What was written for a scene.
+struct Written {
+    todo: Todo,
+    facts: SceneFacts,
+    bake: index::Bake,
+    outputs_written: u64,
+}
+
+fn is_obj(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"))
+}
+
+/// Where a scene goes: below `root`, at its own place, with the extension of its container.
+pub fn target(root: &Path, relative: &str, format: Format) -> PathBuf {
+    let path = root.join(relative);
+    match format {
+        Format::Source if is_obj(&path) => path.with_extension("glb"),
+        Format::Source => path,
+        Format::Glb => path.with_extension("glb"),
+        Format::Gltf => path.with_extension("gltf"),
+    }
+}
+
+fn write_scene(
+    scene: ReadScene,
+    chains: &BTreeMap<JobKey, Arc<Chain>>,
+    output: &OutputFolder,
+    root: &Path,
+) -> Result<Written, Failure> {
+    let settings = &scene.todo.settings.emit.clone();
+    let relative = scene.todo.file.relative.clone();
+    let levels = levels(&scene, chains);
+    let mut record = SceneRecord {
+        path: relative.clone(),
+        status: Status::Baked,
+        settings: None,
+        bytes_in: scene.bytes,
+        bytes_out: 0,
+        outputs: Vec::new(),
+        meshes: record::meshes(&scene, chains, |radius, errors| switches(radius, errors, settings)),
+    };
+    let target = target(root, &relative, settings.format);
+    let stem = target.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let container = match settings.format {
+        Format::Source => scene.scene.document.container,
+        Format::Glb => Container::Glb,
+        Format::Gltf => Container::Gltf,
+    };
+    let mut hashes: Vec<MeshHash> = scene.sub_meshes.iter().flatten().map(|sub| sub.hash).collect();
+    let mut known = BTreeSet::new();
+    hashes.retain(|hash| known.insert(*hash));
+    let ReadScene {
+        todo,
+        dependencies: scene_dependencies,
+        scene: Scene { document, buffers, dependencies, warnings, .. },
+        seen,
+        ..
+    } = scene;
+    let refused = |error: WriteError| Failure {
+        file: todo.file.clone(),
+        cause: format!("failed to write levels into `{relative}`: {error}"),
+        hint: error.hint().map(str::to_owned),
+    };
+    let batches = instancing::batches(&document, &buffers).map_err(|error| refused(error.into()))?;
+    let mut package = Package::new(document, &buffers, dependencies.clone(), container).map_err(refused)?;
+    let added = add_levels(&mut package.document, &levels, &batches, settings).map_err(refused)?;
+    let mut notes = package.notes();
+    notes.extend(added.notes);
+    if added.groups == 0 {
+        record.status = Status::Copied;
+    }
+    let content = if added.groups == 0 && !package.is_converted() && !is_obj(&todo.file.path) {
+        Content::AsSource { copied: dependencies }
+    } else {
+        Content::Files(package.finish(&stem, added.buffer).map_err(refused)?)
+    };
+    let emission = Emission { source: &todo.file.path, target: &target, content: &content };
+    let emitted = output.emit(&emission).map_err(|error| Failure {
+        file: todo.file.clone(),
+        cause: error.to_string(),
+        hint: error.hint().map(str::to_owned),
+    })?;
+    let mut problems: Vec<Problem> = warnings.iter().map(|w| record::warning(&relative, &w.place, &w.text)).collect();
+    problems.extend(notes.iter().map(|note| record::warning(&relative, &note.place, &note.text)));
+    let missing =
+        |uri: &String| record::warning(&relative, "", &format!("`{uri}` is not there, nor beside the output"));
+    problems.extend(emitted.missing.iter().map(missing));
+    let outputs = outputs(&emitted, root).map_err(|error| Failure {
+        file: todo.file.clone(),
+        cause: format!("failed to read back what was written: {error}"),
+        hint: None,
+    })?;
+    record.outputs = outputs
+        .iter()
+        .map(|o| OutputRecord { path: o.relative.clone(), bytes: o.seen.stat.size, hash: o.seen.content.to_string() })
+        .collect();
+    record.bytes_out = record.outputs.iter().filter(|o| is_geometry(&o.path)).map(|o| o.bytes).sum();
+    let bake =
+        index::Bake { scene: seen, dependencies: scene_dependencies, meshes: hashes, outputs, facts: Vec::new() };
+    let outputs_written = emitted.files.iter().filter(|f| f.written).count() as u64;
+    Ok(Written { todo, facts: SceneFacts { record, problems }, bake, outputs_written })
+}
+
+/// What is there now, as the index keeps it. A file that two scenes copy is listed for both.
+fn outputs(emitted: &Emitted, root: &Path) -> std::io::Result<Vec<index::Output>> {
+    let output = |file: &EmittedFile| {
+        let below = file.path.strip_prefix(root).unwrap_or(&file.path);
+        let relative = below.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/");
+        Ok(index::Output { relative, seen: Seen::read(&file.path)? })
+    };
+    emitted.files.iter().map(output).collect()
+}
+
+/// Scenes and buffers, not images.
+fn is_geometry(path: &str) -> bool {
+    let path = Path::new(path);
+    path.extension().is_some_and(|e| ["glb", "gltf", "bin"].iter().any(|known| e.eq_ignore_ascii_case(known)))
+}
+
+/// The levels of every mesh that has a chain, put together from its sub-meshes.
+fn levels(scene: &ReadScene, chains: &BTreeMap<JobKey, Arc<Chain>>) -> Vec<MeshLevels> {
+    let mut shared: BTreeMap<(JobKey, usize), Vec<Vec<Option<Arc<LevelPrimitive>>>>> = BTreeMap::new();
+    let mut out = Vec::new();
+    for source in &scene.scene.meshes {
+        let MeshPlan::Chain(key) = &scene.plans[source.index] else { continue };
+        let chain = &chains[key];
+        let subs = &scene.sub_meshes[source.index];
+        let levels = chain.levels.iter().enumerate().map(|(number, level)| {
+            // Meshes with the same chain share its primitives, and so their bytes in the output.
+            let parts = shared.entry((*key, number)).or_insert_with(|| {
+                let arcs = |part: &Level| part.primitives.iter().map(|p| Some(Arc::new(p.clone()))).collect();
+                let part = |part: &Option<Level>| part.as_ref().map_or_else(Vec::new, arcs);
+                level.parts.iter().map(part).collect()
+            });
+            let mut primitives = vec![PrimitiveLevel::AsSource; source.primitives.len()];
+            for (sub, part) in subs.iter().zip(parts.iter()) {
+                for (&index, primitive) in sub.primitives.iter().zip(part) {
+                    if let Some(primitive) = primitive {
+                        primitives[index] = PrimitiveLevel::Level(primitive.clone());
+                    }
+                }
+            }
+            MeshLevel { primitives, error: level.error, facts: None }
+        });
+        out.push(MeshLevels { mesh: source.index, radius: scene.radii[source.index], levels: levels.collect() });
+    }
+    out
+}
