@@ -18,7 +18,7 @@ const POSITIONS: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0
 fn square_bytes() -> Vec<u8> {
     let floats = POSITIONS.iter().flatten().flat_map(|f| f.to_le_bytes());
     let indices = [0u16, 1, 2, 0, 2, 3].into_iter().flat_map(u16::to_le_bytes);
-    let morph = POSITIONS.iter().flatten().flat_map(|f| (f * 0.5).to_le_bytes());
+    let morph = POSITIONS.iter().flatten().flat_map(|f| f.to_le_bytes());
     floats.chain(indices).chain(morph).collect()
 }
 
@@ -31,12 +31,15 @@ pub(super) fn square() -> Document {
         "scene": 0,
         "scenes": [{ "nodes": [0] }],
         "nodes": [{ "name": "A", "mesh": 0, "translation": [1, 2, 3], "extras": { "id": 7 } }],
-        "meshes": [{ "name": "Square", "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1, "material": 0 }] }],
+        "meshes": [{
+            "name": "Square",
+            "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1, "material": 0 }],
+        }],
         "materials": [{ "name": "M" }],
         "accessors": [
             { "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] },
             { "bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR" },
-            { "bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [0.5, 0.5, 0] },
+            { "bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] },
         ],
         "bufferViews": [
             { "buffer": 0, "byteLength": 48, "target": 34962 },

@@ -410,7 +410,8 @@ fn compressed_vertices_cannot_be_shared() {
     let words = refusal(&source, &[chain(0, &own(0), &shared())]);
     assert_eq!(
         words,
-        "meshes[0].primitives[0], level 2: the source's vertices are compressed with `KHR_draco_mesh_compression` and cannot be shared"
+        "meshes[0].primitives[0], level 2: the source's vertices are compressed with `KHR_draco_mesh_compression` and \
+         cannot be shared"
     );
     bake(&source, &[chain(0, &own(0), &own(0))]);
 }
