@@ -94,7 +94,15 @@ impl Local {
         let folder = path.parent().unwrap_or(&self.folder);
         fs::create_dir_all(folder)?;
         // Removed when it is dropped, so a full disk leaves nothing behind.
-        let mut temporary = readable_by_all(tempfile::Builder::new().prefix(TEMPORARY)).tempfile_in(folder)?;
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(TEMPORARY);
+        #[cfg(unix)]
+        {
+            // Temporary files are for their owner alone, but a cache may be shared: as far as the user's umask allows.
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(fs::Permissions::from_mode(0o666));
+        }
+        let mut temporary = builder.tempfile_in(folder)?;
         entry::write(&mut temporary, key, bytes)?;
         temporary.persist(&path).map_err(|error| error.error)?;
         Ok(())
@@ -116,18 +124,6 @@ impl Local {
         self.lock.get_or_init(|| shared(file));
         Ok(())
     }
-}
-
-/// Temporary files are for their owner alone, but a cache may be shared: as far as the user's umask allows.
-#[cfg(unix)]
-fn readable_by_all<'a, 'b, 'c>(builder: &'a mut tempfile::Builder<'b, 'c>) -> &'a mut tempfile::Builder<'b, 'c> {
-    use std::os::unix::fs::PermissionsExt;
-    builder.permissions(fs::Permissions::from_mode(0o666))
-}
-
-#[cfg(not(unix))]
-fn readable_by_all<'a, 'b, 'c>(builder: &'a mut tempfile::Builder<'b, 'c>) -> &'a mut tempfile::Builder<'b, 'c> {
-    builder
 }
 
 /// Waits while upkeep is at work. File systems without locks do without.

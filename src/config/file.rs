@@ -169,11 +169,11 @@ pub(super) struct SimplifyTable {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("oneOf" = [{ "required": ["ratio"] }, { "required": ["triangles"] }, { "required": ["error"] }]))]
 pub(super) struct LodEntry {
-    /// Share of the source's triangles that is left; between 0 and 1, exclusive.
+    /// Share of each mesh's triangles that is left; between 0 and 1, exclusive.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub ratio: Option<f64>,
 
-    /// Number of triangles that is left; 1 or more.
+    /// Number of triangles that is left of each mesh; 1 or more.
     #[schemars(range(min = 1))]
     pub triangles: Option<u32>,
 

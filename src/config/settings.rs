@@ -68,7 +68,7 @@ impl Default for Weights {
     }
 }
 
-/// What decides the levels of a sub-mesh, given its contraction sequence.
+/// What decides the levels of a mesh, given the contraction sequences of its sub-meshes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ChainSettings {
     /// Finest first; never empty.
@@ -83,9 +83,9 @@ pub struct ChainSettings {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum LevelTarget {
-    /// Share of the source's triangles, between 0 and 1, exclusive.
+    /// Share of the mesh's triangles, between 0 and 1, exclusive.
     Ratio(f64),
-    /// Number of triangles, 1 or more.
+    /// Number of triangles of the mesh, 1 or more.
     Triangles(u32),
     /// Largest distance between the surfaces.
     Error {

@@ -195,7 +195,15 @@ fn read(path: &Path) -> Result<Option<(Records, StoredFacts)>, String> {
 fn write_whole(file: &Path, parts: &[&[u8]]) -> io::Result<()> {
     let folder = file.parent().unwrap_or(Path::new(""));
     fs::create_dir_all(folder)?;
-    let mut temporary = tempfile::Builder::new().prefix(".tmp-").tempfile_in(folder)?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".tmp-");
+    #[cfg(unix)]
+    {
+        // Temporary files are for their owner alone, but a project may be shared: as far as the user's umask allows.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    let mut temporary = builder.tempfile_in(folder)?;
     parts.iter().try_for_each(|part| temporary.write_all(part))?;
     temporary.persist(file).map_err(|error| error.error)?;
     Ok(())

@@ -1,3 +1,5 @@
+//! Every reason to bake again, and every reason not to trust, by example.
+
 use std::fs;
 use std::time::{Duration, SystemTime};
 

@@ -53,22 +53,6 @@ impl Manifest for SequenceJob<'_> {
     }
 }
 
-/// What the levels of a sub-mesh depend on.
-#[derive(Clone, Copy, Debug)]
-pub struct ChainJob<'a> {
-    /// The sequence that they are cut from.
-    pub sequence: SequenceJob<'a>,
-    /// Where it is cut.
-    pub chain: &'a ChainSettings,
-}
-
-impl Manifest for ChainJob<'_> {
-    fn write(&self, to: &mut dyn ManifestWriter) {
-        self.sequence.write(to);
-        write_chain(self.chain, to);
-    }
-}
-
 /// All settings that an output depends on; with the contents that it is made from, it decides every byte.
 impl Manifest for SceneSettings {
     fn write(&self, to: &mut dyn ManifestWriter) {

@@ -13,7 +13,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-pub use jobs::{ChainJob, MeshParts, SequenceJob, write_chain};
+pub use jobs::{MeshParts, SequenceJob, write_chain};
 
 /// Encoding of cached results. Raise it when old bytes can no longer be read.
 pub const FORMAT_VERSION: u32 = 1;
