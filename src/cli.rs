@@ -7,11 +7,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
-use crate::command::{CacheChoice, Context, Exit, OutputClosed, UsageError, bake, completions};
-use crate::config::ConfigError;
-use crate::gltf::document::DocumentError;
+use crate::command::failure::{Failure, UsageError};
+use crate::command::{CacheChoice, Context, Exit, bake, completions, inspect};
 use crate::progress::{JsonLines, Lines, Paint, Reporter, Terminal, Verbosity};
-use crate::report::ReportError;
 
 /// The pipeline that a bare `lodbake` bakes.
 const DEFAULT_PIPELINE: &str = "pipeline.toml";
@@ -82,6 +80,8 @@ enum ColorChoice {
 enum Command {
     /// Bake the scenes of a pipeline
     Bake(bake::Bake),
+    /// Show what is in a scene, and what a bake would save
+    Inspect(inspect::Inspect),
     /// Write completions for a shell to standard output
     Completions(completions::Completions),
 }
@@ -101,6 +101,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> Exit {
     let context = cli.global.settle();
     let done = match &cli.command {
         Command::Bake(command) => command.run(&context),
+        Command::Inspect(command) => command.run(&context),
         Command::Completions(command) => command.run(Cli::command(), &context),
     };
     match done {
@@ -285,47 +286,12 @@ fn variable(name: &str) -> Option<OsString> {
 
 /// Tells an error once, with its causes and its hint, and chooses the exit code.
 fn tell_error(error: &anyhow::Error, paint: Paint) -> Exit {
-    if has::<OutputClosed>(error) {
-        return Exit::Fine;
+    let failure = Failure::of(error);
+    if failure.exit != Exit::Fine {
+        let written = writeln!(io::stderr().lock(), "{}", failure.lines(paint));
+        drop(written); // nobody listens
     }
-    let text = paint.error_lines(&message(error), hint(error).as_deref());
-    let written = writeln!(io::stderr().lock(), "{text}");
-    drop(written); // nobody listens
-    exit(error)
-}
-
-/// The error and its causes on one line. A cause that the error above it already tells is not repeated.
-fn message(error: &anyhow::Error) -> String {
-    let mut text = String::new();
-    for cause in error.chain() {
-        let told = cause.to_string();
-        if text.is_empty() {
-            text = told;
-        } else if !text.contains(&told) {
-            text = format!("{text}: {told}");
-        }
-    }
-    text
-}
-
-/// The way out that the first cause with one offers.
-fn hint(error: &anyhow::Error) -> Option<String> {
-    error.chain().find_map(|cause| {
-        let usage = cause.downcast_ref::<UsageError>().map(|e| e.hint.clone());
-        let config = || cause.downcast_ref::<ConfigError>().map(ConfigError::hint);
-        let document = || cause.downcast_ref::<DocumentError>().map(|e| e.hint().map(str::to_owned));
-        let report = || cause.downcast_ref::<ReportError>().map(|e| e.hint().map(str::to_owned));
-        usage.or_else(config).or_else(document).or_else(report).flatten()
-    })
-}
-
-fn exit(error: &anyhow::Error) -> Exit {
-    if has::<UsageError>(error) || has::<ConfigError>(error) { Exit::Usage } else { Exit::Undone }
-}
-
-/// Whether an error of that type is among the causes.
-fn has<E: std::error::Error + 'static>(error: &anyhow::Error) -> bool {
-    error.chain().any(<dyn std::error::Error + 'static>::is::<E>)
+    failure.exit
 }
 
 #[cfg(test)]
@@ -395,19 +361,5 @@ mod tests {
         assert_eq!(error.hint.as_deref(), Some("did you mean `inspect`?"));
         let error = defaulted("lodbake zzz", false).expect_err("it is no command");
         assert_eq!(error.hint.as_deref(), Some("`lodbake --help` lists the commands"));
-    }
-
-    #[test]
-    fn causes_are_told_once() {
-        let inner = anyhow::anyhow!("permission denied");
-        let error = inner.context("failed to write `a`: permission denied").context("failed to bake");
-        assert_eq!(message(&error), "failed to bake: failed to write `a`: permission denied");
-    }
-
-    #[test]
-    fn usage_errors_have_their_own_exit_code() {
-        let usage = anyhow::Error::new(UsageError { message: "no".into(), hint: None }).context("in `x`");
-        assert_eq!(exit(&usage), Exit::Usage);
-        assert_eq!(exit(&anyhow::anyhow!("no")), Exit::Undone);
     }
 }

@@ -5,12 +5,15 @@
 
 pub mod bake;
 pub mod completions;
+pub mod failure;
+pub mod inspect;
 
 use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use crate::progress::{Paint, Reporter};
+use failure::{Failure, OutputClosed};
 
 /// Exit codes, a promise to scripts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -57,21 +60,6 @@ pub enum CacheChoice {
     Off,
 }
 
-/// Standard output was closed by its reader (`lodbake … | head`): the end of the work, and not an error.
-#[derive(Debug, thiserror::Error)]
-#[error("standard output is closed")]
-pub struct OutputClosed;
-
-/// The user asked for something that cannot be: [`Exit::Usage`].
-#[derive(Debug, thiserror::Error)]
-#[error("{message}")]
-pub struct UsageError {
-    /// What is wrong.
-    pub message: String,
-    /// What to do about it.
-    pub hint: Option<String>,
-}
-
 impl Context {
     /// Data, to standard output.
     pub fn print(&self, text: &str) -> anyhow::Result<()> {
@@ -80,6 +68,12 @@ impl Context {
             Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Err(OutputClosed.into()),
             written => written.map_err(|error| anyhow::Error::new(error).context("failed to write the output")),
         }
+    }
+
+    /// An error that does not end the command, to standard error.
+    pub fn error(&self, error: &anyhow::Error) {
+        let written = writeln!(io::stderr().lock(), "{}", Failure::of(error).lines(self.paint_told));
+        drop(written); // nobody listens: no reason to stop
     }
 
     /// Words for a person, to standard error; nothing with `--quiet` and `--json`.

@@ -3,13 +3,16 @@
 //! Reads no clock: progress is told at every tenth of the work, so a log has the same length on every machine.
 
 use std::io::Write;
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::quantity::{count, plural};
 use super::{Event, Paint, Reporter, Sink, Summary, failure_message, write_line};
 
 /// Failed scenes named again at the end; more than these are counted only.
 const NAMED_AT_THE_END: usize = 20;
+
+/// Fewer scenes are written in no time once their meshes are baked: not worth ten lines.
+const SCENES_WORTH_TELLING: u64 = 100;
 
 /// How much is told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -69,9 +72,19 @@ impl Lines {
         }
     }
 
+    fn tally(&self) -> MutexGuard<'_, Tally> {
+        self.tally.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn scene_done(&self) {
+        if self.tally().files.total >= SCENES_WORTH_TELLING {
+            self.step("scenes", |tally| &mut tally.files);
+        }
+    }
+
     fn step(&self, what: &str, pick: impl Fn(&mut Tally) -> &mut Tenths) {
         let line = {
-            let mut tally = self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let mut tally = self.tally();
             let tenths = pick(&mut tally);
             tenths.step().map(|percent| format!("{what} {percent} % ({} of {})", tenths.done, tenths.total))
         };
@@ -82,12 +95,11 @@ impl Lines {
 
     fn failed(&self, path: &str, error: &str, hint: Option<&str>) {
         self.tell(Verbosity::Quiet, &self.paint.error_lines(&failure_message(path, error), hint));
-        self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner).failed.push(path.to_owned());
+        self.tally().failed.push(path.to_owned());
     }
 
     fn finished(&self, summary: &Summary) {
-        let mut failed =
-            std::mem::take(&mut self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner).failed);
+        let mut failed = std::mem::take(&mut self.tally().failed);
         failed.sort();
         if let Some(text) = failures(&failed, summary.files) {
             self.tell(Verbosity::Normal, &format!("{} {text}", self.paint.error("error:")));
@@ -111,11 +123,11 @@ impl Reporter for Lines {
     fn event(&self, event: &Event) {
         match event {
             Event::ScanFinished { files } => {
-                self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner).files.total = *files;
+                self.tally().files.total = *files;
                 self.tell(Verbosity::Verbose, &format!("found {}", plural(*files, "scene")));
             }
             Event::PlanFinished { found, distinct, jobs, triangles } => {
-                self.tally.lock().unwrap_or_else(std::sync::PoisonError::into_inner).jobs.total += *jobs;
+                self.tally().jobs.total += *jobs;
                 if *jobs > 0 {
                     let (found, distinct, triangles) =
                         (plural(*found, "mesh"), count(*distinct), plural(*triangles, "triangle"));
@@ -127,7 +139,8 @@ impl Reporter for Lines {
             }
             Event::SceneUnchanged { path } => {
                 self.tell(Verbosity::Verbose, &format!("unchanged {path}"));
-                self.step("scenes", |tally| &mut tally.files);
+                let mut tally = self.tally();
+                tally.files.total = tally.files.total.saturating_sub(1);
             }
             Event::SceneStarted { .. } => {}
             Event::SceneRead { path, meshes, .. } => {
@@ -151,11 +164,11 @@ impl Reporter for Lines {
             Event::SceneWritten { path, changed, .. } => {
                 let how = if *changed { "wrote" } else { "left untouched" };
                 self.tell(Verbosity::Verbose, &format!("{how} {path}"));
-                self.step("scenes", |tally| &mut tally.files);
+                self.scene_done();
             }
             Event::SceneFailed { path, error, hint } => {
                 self.failed(path, error, hint.as_deref());
-                self.step("scenes", |tally| &mut tally.files);
+                self.scene_done();
             }
             Event::Warning { message, hint } => {
                 self.tell(Verbosity::Normal, &self.paint.warning_lines(message, hint.as_deref()));
@@ -215,10 +228,21 @@ mod tests {
     }
 
     #[test]
-    fn few_files_skip_tenths_rather_than_repeat_them() {
-        let text =
-            told(Verbosity::Normal, &[Event::ScanFinished { files: 3 }, written("a"), written("b"), written("c")]);
-        assert_eq!(text, "scenes 30 % (1 of 3)\nscenes 60 % (2 of 3)\nscenes 100 % (3 of 3)\n");
+    fn few_meshes_skip_tenths_rather_than_repeat_them() {
+        let mesh = || Event::JobFinished { mesh: "00ff".into(), triangles: 9, cached: false };
+        let plan = Event::PlanFinished { found: 3, distinct: 3, jobs: 3, triangles: 27 };
+        let text = told(Verbosity::Normal, &[plan, mesh(), mesh(), mesh()]);
+        let lines: Vec<&str> = text.lines().collect();
+        let tenths = ["meshes 30 % (1 of 3)", "meshes 60 % (2 of 3)", "meshes 100 % (3 of 3)"];
+        assert_eq!((lines[0], &lines[1..]), ("3 meshes, 3 distinct: 3 to bake, 27 triangles", &tenths[..]));
+    }
+
+    #[test]
+    fn unchanged_and_few_scenes_are_not_counted_aloud() {
+        let mut events = vec![Event::ScanFinished { files: 150 }];
+        events.extend((0..90).map(|_| Event::SceneUnchanged { path: "a.glb".into() }));
+        events.extend((0..60).map(|_| written("b.glb")));
+        assert_eq!(told(Verbosity::Normal, &events), "");
     }
 
     #[test]

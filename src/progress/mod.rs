@@ -49,9 +49,9 @@ pub enum Event {
         /// Sub-meshes found in the scene.
         meshes: u64,
     },
-    /// All scenes are read: this is the work.
+    /// A wave of scenes is read: this is its work. A large bake has several waves.
     PlanFinished {
-        /// Sub-meshes found in all scenes.
+        /// Sub-meshes found in the wave.
         found: u64,
         /// Distinct ones among them, each of them at most one job.
         distinct: u64,

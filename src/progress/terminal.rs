@@ -30,15 +30,18 @@ pub struct Terminal {
 #[derive(Default)]
 struct State {
     phase: Phase,
+    files: u64,
+    /// Scenes that need not be read any more.
+    read: u64,
+    /// Scenes that are through: written, unchanged or failed.
+    done: u64,
     meshes: u64,
     meshes_done: u64,
-    /// Scenes that are through, unchanged or failed, while others are still read.
-    scenes_done: u64,
     running: Vec<(String, u64)>,
     failed: Vec<String>,
 }
 
-/// What the first bar counts.
+/// What is done with scenes now. Both alternate, since scenes come in waves.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 enum Phase {
     #[default]
@@ -50,9 +53,9 @@ impl Terminal {
     /// Bars on standard error; `verbose` also tells each scene on a line that stays.
     pub fn new(paint: Paint, verbose: bool) -> Self {
         let bars = MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(REDRAWS_PER_SECOND));
-        let files = bars.add(ProgressBar::no_length().with_style(files_style()).with_prefix("scanning"));
+        // Hidden until there is something to count: most commands send no event.
+        let files = ProgressBar::hidden().with_style(files_style());
         let jobs = ProgressBar::hidden().with_style(jobs_style());
-        files.enable_steady_tick(TICK);
         Self { bars, files, jobs, paint, verbose, state: Mutex::default() }
     }
 
@@ -72,25 +75,48 @@ impl Terminal {
         }
     }
 
-    fn planned(&self, jobs: u64, triangles: u64) {
-        let scenes_done = {
-            let mut state = self.state();
-            state.phase = Phase::Writing;
-            state.meshes = jobs;
-            state.scenes_done
+    fn scanned(&self, files: u64) {
+        self.state().files = files;
+        self.files.set_length(2 * files);
+        self.bars.add(self.files.clone());
+        self.files.enable_steady_tick(TICK);
+        self.describe_files(|_| {});
+    }
+
+    /// A scene is half done when it is read and done when it is written: so the bar never runs backwards.
+    fn describe_files(&self, change: impl FnOnce(&mut State)) {
+        let mut state = self.state();
+        change(&mut state);
+        let (what, number) = match state.phase {
+            Phase::Reading => ("reading", state.read),
+            Phase::Writing => ("writing", state.done),
         };
-        self.files.set_prefix("scenes");
-        self.files.set_position(scenes_done);
-        self.files.set_message("");
-        if jobs > 0 {
-            self.jobs.set_length(triangles);
+        let label = format!("{}/{}", count(number), count(state.files));
+        let position = state.read + state.done;
+        drop(state);
+        self.files.set_prefix(what);
+        self.files.set_position(position);
+        self.files.set_message(label);
+    }
+
+    fn planned(&self, jobs: u64, triangles: u64) {
+        self.describe_files(|state| {
+            state.phase = Phase::Writing;
+            state.meshes += jobs;
+        });
+        if jobs == 0 {
+            return;
+        }
+        let is_first = self.jobs.length().unwrap_or(0) == 0;
+        self.jobs.set_length(self.jobs.length().unwrap_or(0) + triangles);
+        if is_first {
             self.bars.add(self.jobs.clone());
-            self.jobs.set_prefix("meshes");
+            self.jobs.set_prefix("baking");
             self.jobs.reset_elapsed();
             self.jobs.reset_eta();
             self.jobs.enable_steady_tick(TICK);
-            self.describe_jobs();
         }
+        self.describe_jobs();
     }
 
     fn job_started(&self, mesh: &str, triangles: u64) {
@@ -122,14 +148,16 @@ impl Terminal {
     }
 
     fn scene_done(&self) {
-        self.state().scenes_done += 1;
-        self.files.inc(1);
+        self.describe_files(|state| state.done += 1);
     }
 
     fn failed(&self, path: &str, error: &str, hint: Option<&str>) {
         self.say(&self.paint.error_lines(&failure_message(path, error), hint));
-        self.state().failed.push(path.to_owned());
-        self.scene_done();
+        self.describe_files(|state| {
+            state.failed.push(path.to_owned());
+            state.done += 1;
+            state.read += u64::from(state.phase == Phase::Reading);
+        });
     }
 
     fn finished(&self, summary: &Summary) {
@@ -146,20 +174,18 @@ impl Terminal {
 impl Reporter for Terminal {
     fn event(&self, event: &Event) {
         match event {
-            Event::ScanFinished { files } => {
-                self.files.set_length(*files);
-                self.files.set_prefix("reading");
-            }
-            Event::SceneStarted { path } => self.files.set_message(path.clone()),
+            Event::ScanFinished { files } => self.scanned(*files),
+            Event::SceneStarted { .. } => self.describe_files(|state| state.phase = Phase::Reading),
             Event::SceneRead { path, meshes, .. } => {
                 self.detail(&format!("read {path}: {}", plural(*meshes, "mesh")));
-                if self.state().phase == Phase::Reading {
-                    self.files.inc(1); // read, not done: the bar starts again when all is read
-                }
+                self.describe_files(|state| state.read += 1);
             }
             Event::SceneUnchanged { path } => {
                 self.detail(&format!("unchanged {path}"));
-                self.scene_done();
+                self.describe_files(|state| {
+                    state.read += 1;
+                    state.done += 1;
+                });
             }
             Event::PlanFinished { jobs, triangles, .. } => self.planned(*jobs, *triangles),
             Event::JobStarted { mesh, triangles } => self.job_started(mesh, *triangles),
@@ -172,7 +198,6 @@ impl Reporter for Terminal {
             }
             Event::SceneWritten { path, changed, .. } => {
                 self.detail(&format!("{} {path}", if *changed { "wrote" } else { "left untouched" }));
-                self.files.set_message(path.clone());
                 self.scene_done();
             }
             Event::SceneFailed { path, error, hint } => self.failed(path, error, hint.as_deref()),
@@ -191,7 +216,7 @@ impl Drop for Terminal {
 }
 
 fn files_style() -> ProgressStyle {
-    ProgressStyle::with_template("{prefix:>8} {bar:24} {pos}/{len}  {wide_msg}")
+    ProgressStyle::with_template("{prefix:>8} {bar:24} {msg}")
         .expect("the template is a constant")
         .progress_chars("━╸ ")
 }

@@ -5,6 +5,7 @@
 //! that had nothing to do. (The story is in the events of `progress`.) Knows nothing of how the facts came about.
 
 mod assemble;
+pub mod inspection;
 mod json;
 mod table;
 

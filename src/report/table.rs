@@ -14,7 +14,7 @@ use crate::progress::quantity::{bytes, count, duration, plural};
 /// The end of a bake in words: `report` says what the outputs are, `summary` what this run did, in `wall` time.
 pub fn summary_table(report: &Report, summary: &Summary, wall: Duration) -> String {
     let sentence = sentence(summary, wall);
-    if summary.baked + summary.copied == 0 {
+    if summary.dry_run || summary.baked + summary.copied == 0 {
         return sentence;
     }
     let parts = [Some(sentence), Some(figures(report, summary)), levels(report), missed(report)];
@@ -38,11 +38,11 @@ fn sentence(summary: &Summary, wall: Duration) -> String {
         .filter(|(number, _)| *number > 0)
         .map(|(number, what)| format!("{} {what}", count(*number)))
         .collect();
-    if summary.baked > 0 {
-        parts.insert(
-            0,
-            format!("{} {}", if summary.dry_run { "would bake" } else { "baked" }, plural(summary.baked, "scene")),
-        );
+    let scenes = plural(summary.baked, "scene");
+    if summary.baked > 0 && summary.dry_run {
+        parts.insert(0, format!("would bake {scenes} with {}", plural(summary.jobs, "job")));
+    } else if summary.baked > 0 {
+        parts.insert(0, format!("baked {scenes}"));
     } else if summary.unchanged + summary.skipped == summary.files {
         return format!("no work: {} unchanged ({time})", plural(summary.unchanged, "scene"));
     }

@@ -204,3 +204,10 @@ fn a_run_without_work_says_so_in_one_line() {
     let failed = Summary { files: 3, unchanged: 2, failed: 1, ..Summary::default() };
     assert_eq!(summary_table(&report(), &failed, Duration::ZERO), "2 unchanged, 1 failed (0.00 s)");
 }
+
+#[test]
+fn a_dry_run_says_what_would_be_done() {
+    let summary = Summary { dry_run: true, files: 9, baked: 7, jobs: 1, skipped: 2, ..Summary::default() };
+    let text = summary_table(&report(), &summary, Duration::ZERO);
+    assert_eq!(text, "would bake 7 scenes with 1 job, 2 skipped (0.00 s)");
+}

@@ -145,9 +145,7 @@ impl<'a> Session<'a> {
         let failed = 0 < self.summary.failed || 0 < self.undone;
         let finished = Event::Finished { summary: self.summary.clone(), seconds: wall.as_secs_f64() };
         self.context.reporter.event(&finished);
-        if !dry_run && !self.context.json && !self.context.quiet {
-            self.context.print(&report::summary_table(&report, &self.summary, wall))?;
-        }
+        self.context.tell(&report::summary_table(&report, &self.summary, wall));
         Ok(if failed { Exit::Undone } else { Exit::Fine })
     }
 }

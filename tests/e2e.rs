@@ -1,0 +1,13 @@
+//! End to end through the binary: one file per command or behaviour in `tests/e2e/`, one test binary.
+
+#[path = "e2e/scene.rs"]
+mod scene;
+#[path = "e2e/space.rs"]
+mod space;
+
+#[path = "e2e/usage.rs"]
+mod usage;
+#[path = "e2e/inspect.rs"]
+mod inspect;
+#[path = "e2e/bake.rs"]
+mod bake;
