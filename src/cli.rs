@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::command::failure::{Failure, UsageError};
-use crate::command::{CacheChoice, Context, Exit, bake, completions, inspect};
+use crate::command::{CacheChoice, Context, Exit, bake, cache, completions, explain, init, inspect, schema};
 use crate::progress::{JsonLines, Lines, Paint, Reporter, Terminal, Verbosity};
 
 /// The pipeline that a bare `lodbake` bakes.
@@ -80,8 +80,16 @@ enum ColorChoice {
 enum Command {
     /// Bake the scenes of a pipeline
     Bake(bake::Bake),
+    /// Write a commented pipeline to start from
+    Init(init::Init),
     /// Show what is in a scene, and what a bake would save
     Inspect(inspect::Inspect),
+    /// Tell why a scene would be baked again
+    Explain(explain::Explain),
+    /// Look after the cache
+    Cache(cache::CacheCommand),
+    /// Write the JSON schema of a file format to standard output
+    Schema(schema::Schema),
     /// Write completions for a shell to standard output
     Completions(completions::Completions),
 }
@@ -101,6 +109,10 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> Exit {
     let context = cli.global.settle();
     let done = match &cli.command {
         Command::Bake(command) => command.run(&context),
+        Command::Init(command) => command.run(&context),
+        Command::Explain(command) => command.run(&context),
+        Command::Cache(command) => command.run(&context),
+        Command::Schema(command) => command.run(&context),
         Command::Inspect(command) => command.run(&context),
         Command::Completions(command) => command.run(Cli::command(), &context),
     };

@@ -77,8 +77,8 @@ impl Node {
     #[inline]
     fn squared_distance(&self, p: [f64; 3]) -> f64 {
         let mut sum = 0.0;
-        for i in 0..3 {
-            let off = (self.low[i] - p[i]).max(p[i] - self.high[i]).max(0.0);
+        for ((low, high), at) in self.low.iter().zip(&self.high).zip(p) {
+            let off = (low - at).max(at - high).max(0.0);
             sum += off * off;
         }
         sum

@@ -307,7 +307,7 @@ fn used_positions(primitive: &Primitive) -> impl Iterator<Item = [f64; 3]> + '_ 
     let mut used = vec![false; primitive.count];
     primitive.indices.iter().for_each(|&i| used[i as usize] = true);
     let positions = primitive.positions();
-    used.into_iter().zip(positions).filter_map(|(used, p)| used.then(|| p.map(f64::from)))
+    used.into_iter().zip(positions).filter(|(used, _)| *used).map(|(_, p)| p.map(f64::from))
 }
 
 fn thinned(points: impl Iterator<Item = [f64; 3]>, count: usize) -> impl Iterator<Item = [f64; 3]> {

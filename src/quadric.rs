@@ -96,6 +96,7 @@ impl<const M: usize> Default for FieldQuadric<M> {
     }
 }
 
+#[expect(clippy::needless_range_loop, reason = "one index runs over several flat arrays")]
 impl<const M: usize> FieldQuadric<M> {
     /// Of one triangle: the fields take the values `s` at its corners `p` and are linear between them.
     /// `normal` is the cross product of the edges (twice the area long), `weight` the triangle's weight.

@@ -12,6 +12,7 @@ use lodbake::metric::its::EdgeWeights;
 use lodbake::simplify::{MetricKind, Settings, simplify};
 use rayon::prelude::*;
 
+#[expect(clippy::print_stderr, reason = "a test that is skipped says so")]
 /// The corpus folder; `None` (said aloud) if it is not there, a failure in CI.
 fn corpus() -> Option<PathBuf> {
     let named = std::env::var_os("LODBAKE_CORPUS").map(PathBuf::from);
@@ -131,7 +132,7 @@ fn check_attribute(place: &str, found: &Attribute, count: usize, source: &Attrib
             let most = source.values.iter().copied().fold(0.0, f32::max);
             assert!(found.values.iter().all(|&j| j <= most && j.fract() == 0.0), "{place}: joint out of range");
         }
-        name if name == "WEIGHTS_0" => {
+        "WEIGHTS_0" => {
             let sums = |a: &Attribute| a.values.chunks_exact(4).all(|w| (w.iter().sum::<f32>() - 1.0).abs() < 0.02);
             assert!(!sums(source) || sums(found), "{place}: weights do not sum to 1");
         }

@@ -4,9 +4,13 @@
 //! `run(&self, &Context) -> anyhow::Result<Exit>`. It knows nothing of other commands' arguments.
 
 pub mod bake;
+pub mod cache;
 pub mod completions;
+pub mod explain;
 pub mod failure;
+pub mod init;
 pub mod inspect;
+pub mod schema;
 
 use std::io::{self, Write};
 use std::num::NonZeroUsize;

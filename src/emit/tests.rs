@@ -90,7 +90,7 @@ fn files_appear_beside_each_other_and_the_main_file_last() {
 fn equal_files_are_not_touched() {
     let space = Space::new();
     space.put("in/a.gltf", b"source");
-    space.put("in/b.png", &[7; 200_000]);
+    space.put("in/b.png", &vec![7; 200_000]);
     let content = || files(b"{}", &[("a.lod.bin", b"levels")], vec![space.dependency("b.png")]);
     space.emit("in/a.gltf", "out/a.gltf", &content()).unwrap();
     let old = ["out/a.gltf", "out/a.lod.bin", "out/b.png"].map(|name| space.age(name));

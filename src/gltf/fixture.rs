@@ -78,6 +78,6 @@ pub(super) fn level(primitives: &[Arc<LevelPrimitive>], error: f64) -> MeshLevel
 
 /// Two levels for `mesh`, of one primitive each.
 pub(super) fn chain(mesh: usize, first: &Arc<LevelPrimitive>, second: &Arc<LevelPrimitive>) -> MeshLevels {
-    let levels = vec![level(&[first.clone()], 0.01), level(&[second.clone()], 0.1)];
+    let levels = vec![level(std::slice::from_ref(first), 0.01), level(std::slice::from_ref(second), 0.1)];
     MeshLevels { mesh, radius: 0.75, levels }
 }

@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use json::{FILE_NAME, ReportError, Written, read, schema, to_json, write};
-pub use table::summary_table;
+pub use table::{columns, summary_table};
 
 use crate::config::{LevelTarget, SceneSettings};
 use crate::mesh::hash::MeshHash;

@@ -57,18 +57,19 @@ pub fn simplify(mesh: &Mesh, settings: &Settings) -> Progressive {
     let (mut surface, weld) = Topology::new(mesh, &layout);
     let recorder = Recorder::new(mesh, &surface, &layout, weld);
     let locks = Locks::new(&surface, settings.lock_border);
-    build(&mut surface, settings, locks, recorder)
+    build(&mut surface, settings, &locks, recorder)
 }
+
+/// Numbers of columns that meshes have: normals, + one or two texture sets, + colours. Others are padded with zeros.
+const WIDTHS: [usize; 6] = [3, 5, 7, 9, 16, 32];
 
 /// The only place that builds a metric. The number of columns is a compile-time constant of `its`, so that its inner
 /// loops have known lengths.
-fn build(surface: &mut Topology, settings: &Settings, locks: Locks, recorder: Recorder) -> Progressive {
+fn build(surface: &mut Topology, settings: &Settings, locks: &Locks, recorder: Recorder) -> Progressive {
     if settings.metric == MetricKind::Qem {
         let metric = Qem::new(surface, settings.edges.border, settings.placement);
-        return run(surface, metric, &locks, recorder);
+        return run(surface, metric, locks, recorder);
     }
-    // Widths that meshes have: nothing, normals, + one or two texture sets, + colours. Others are padded with zeros.
-    const WIDTHS: [usize; 6] = [3, 5, 7, 9, 16, 32];
     let width = WIDTHS.into_iter().find(|&width| surface.columns <= width).expect("a layout has at most 32 columns");
     surface.resize_columns(width);
     macro_rules! its {
@@ -76,7 +77,7 @@ fn build(surface: &mut Topology, settings: &Settings, locks: Locks, recorder: Re
             match width {
                 $($m => {
                     let metric = Its::<$m>::new(surface, settings.edges, settings.placement);
-                    run(surface, metric, &locks, recorder)
+                    run(surface, metric, locks, recorder)
                 })*
                 _ => unreachable!("a width of the list"),
             }

@@ -177,7 +177,9 @@ impl<'a> Replay<'a> {
                         values.extend_from_slice(&self.values[at..at + field.components]);
                     }
                     if field.kind == FieldKind::Color {
-                        values.iter_mut().for_each(|value| *value = clamp_color(*value, source));
+                        for value in &mut values {
+                            *value = clamp_color(*value, source);
+                        }
                     }
                 }
                 None => self.passive.write(primitive, index, source, cut, &mut values),
@@ -456,7 +458,9 @@ fn join_influences(a: &[(u32, f32)], b: &[(u32, f32)], t: f32, most: usize) -> V
     out.truncate(most);
     let sum: f32 = out.iter().map(|known| known.1).sum();
     if 0.0 < sum {
-        out.iter_mut().for_each(|known| known.1 /= sum);
+        for known in &mut out {
+            known.1 /= sum;
+        }
     }
     out
 }

@@ -82,11 +82,6 @@ fn a_flat_grid_becomes_two_triangles_and_keeps_its_outline() {
     for settings in all_settings() {
         let sequence = simplify(&mesh, &settings);
         let steps = sequence.cut_at(2);
-        for st in &sequence.steps {
-            if st.cost > 1e-12 {
-                eprintln!("{st:?}");
-            }
-        }
         let left = triangles(&mesh, &sequence, steps);
         assert_eq!(left.len(), 2, "{settings:?}");
         let sum: f64 = left.iter().map(area).sum();

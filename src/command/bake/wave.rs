@@ -72,7 +72,7 @@ pub struct ReadScene {
 
 /// Why a scene failed.
 struct Failure {
-    file: SceneFile,
+    file: Box<SceneFile>,
     cause: String,
     hint: Option<String>,
 }
@@ -156,7 +156,7 @@ impl Session<'_> {
             .map(|scene| {
                 let written = write_scene(scene, &baked.chains, output, root)?;
                 let path = written.todo.file.relative.clone();
-                let changed = 0 < written.outputs_written;
+                let changed = 0 < written.new_files;
                 reporter.event(&Event::SceneWritten { path, bytes: written.facts.record.bytes_out, changed });
                 Ok(written)
             })
@@ -170,12 +170,12 @@ impl Session<'_> {
     }
 
     fn take_written(&mut self, written: Written) {
-        let Written { todo, mut facts, bake, outputs_written } = written;
+        let Written { todo, mut facts, bake, new_files } = written;
         match facts.record.status {
             Status::Copied => self.summary.copied += 1,
             _ => self.summary.baked += 1,
         }
-        self.summary.outputs_written += outputs_written;
+        self.summary.outputs_written += new_files;
         for problem in &facts.problems {
             self.summary.warnings += 1;
             let place = if problem.place.is_empty() { String::new() } else { format!("{}: ", problem.place) };
@@ -213,8 +213,11 @@ impl ReadScene {
 
 fn read_scene(todo: Todo) -> Result<ReadScene, Failure> {
     let file = &todo.file;
-    let failure =
-        |cause: String, hint: Option<&str>| Failure { file: file.clone(), cause, hint: hint.map(str::to_owned) };
+    let failure = |cause: String, hint: Option<&str>| Failure {
+        file: Box::new(file.clone()),
+        cause,
+        hint: hint.map(str::to_owned),
+    };
     let base = file.path.parent().unwrap_or(Path::new(""));
     let is_obj = is_obj(&file.path);
     // Files are looked at before they are read: one that changes in between is found by the next bake.
@@ -278,7 +281,7 @@ struct Written {
     todo: Todo,
     facts: SceneFacts,
     bake: index::Bake,
-    outputs_written: u64,
+    new_files: u64,
 }
 
 fn is_obj(path: &Path) -> bool {
@@ -332,7 +335,7 @@ fn write_scene(
         ..
     } = scene;
     let refused = |error: WriteError| Failure {
-        file: todo.file.clone(),
+        file: Box::new(todo.file.clone()),
         cause: format!("failed to write levels into `{relative}`: {error}"),
         hint: error.hint().map(str::to_owned),
     };
@@ -351,7 +354,7 @@ fn write_scene(
     };
     let emission = Emission { source: &todo.file.path, target: &target, content: &content };
     let emitted = output.emit(&emission).map_err(|error| Failure {
-        file: todo.file.clone(),
+        file: Box::new(todo.file.clone()),
         cause: error.to_string(),
         hint: error.hint().map(str::to_owned),
     })?;
@@ -361,7 +364,7 @@ fn write_scene(
         |uri: &String| record::warning(&relative, "", &format!("`{uri}` is not there, nor beside the output"));
     problems.extend(emitted.missing.iter().map(missing));
     let outputs = outputs(&emitted, root).map_err(|error| Failure {
-        file: todo.file.clone(),
+        file: Box::new(todo.file.clone()),
         cause: format!("failed to read back what was written: {error}"),
         hint: None,
     })?;
@@ -372,8 +375,8 @@ fn write_scene(
     record.bytes_out = record.outputs.iter().filter(|o| is_geometry(&o.path)).map(|o| o.bytes).sum();
     let bake =
         index::Bake { scene: seen, dependencies: scene_dependencies, meshes: hashes, outputs, facts: Vec::new() };
-    let outputs_written = emitted.files.iter().filter(|f| f.written).count() as u64;
-    Ok(Written { todo, facts: SceneFacts { record, problems }, bake, outputs_written })
+    let new_files = emitted.files.iter().filter(|f| f.written).count() as u64;
+    Ok(Written { todo, facts: SceneFacts { record, problems }, bake, new_files })
 }
 
 /// What is there now, as the index keeps it. A file that two scenes copy is listed for both.
@@ -392,9 +395,12 @@ fn is_geometry(path: &str) -> bool {
     path.extension().is_some_and(|e| ["glb", "gltf", "bin"].iter().any(|known| e.eq_ignore_ascii_case(known)))
 }
 
+/// One sub-mesh at one level, shared by the meshes that have it; empty if it stays as the source.
+type SharedPart = Vec<Arc<LevelPrimitive>>;
+
 /// The levels of every mesh that has a chain, put together from its sub-meshes.
 fn levels(scene: &ReadScene, chains: &BTreeMap<JobKey, Arc<Chain>>) -> Vec<MeshLevels> {
-    let mut shared: BTreeMap<(JobKey, usize), Vec<Vec<Option<Arc<LevelPrimitive>>>>> = BTreeMap::new();
+    let mut shared: BTreeMap<(JobKey, usize), Vec<SharedPart>> = BTreeMap::new();
     let mut out = Vec::new();
     for source in &scene.scene.meshes {
         let MeshPlan::Chain(key) = &scene.plans[source.index] else { continue };
@@ -403,16 +409,14 @@ fn levels(scene: &ReadScene, chains: &BTreeMap<JobKey, Arc<Chain>>) -> Vec<MeshL
         let levels = chain.levels.iter().enumerate().map(|(number, level)| {
             // Meshes with the same chain share its primitives, and so their bytes in the output.
             let parts = shared.entry((*key, number)).or_insert_with(|| {
-                let arcs = |part: &Level| part.primitives.iter().map(|p| Some(Arc::new(p.clone()))).collect();
+                let arcs = |part: &Level| part.primitives.iter().map(|p| Arc::new(p.clone())).collect();
                 let part = |part: &Option<Level>| part.as_ref().map_or_else(Vec::new, arcs);
                 level.parts.iter().map(part).collect()
             });
             let mut primitives = vec![PrimitiveLevel::AsSource; source.primitives.len()];
             for (sub, part) in subs.iter().zip(parts.iter()) {
                 for (&index, primitive) in sub.primitives.iter().zip(part) {
-                    if let Some(primitive) = primitive {
-                        primitives[index] = PrimitiveLevel::Level(primitive.clone());
-                    }
+                    primitives[index] = PrimitiveLevel::Level(primitive.clone());
                 }
             }
             MeshLevel { primitives, error: level.error, facts: None }

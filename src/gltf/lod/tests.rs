@@ -248,9 +248,9 @@ fn instances_are_drawn_at_every_level_and_switch_as_one() {
     assert_eq!(rules::check(&source, &document), []);
     let nodes = document.array("nodes").unwrap();
     assert_eq!(nodes[0]["extensions"], json!({ "KHR_node_visibility": { "visible": true } }));
-    for member in 1..4 {
-        assert_eq!(nodes[member]["extensions"]["EXT_mesh_gpu_instancing"], instancing);
-        assert!(nodes[member]["extensions"].get("EXT_instance_features").is_some());
+    for member in &nodes[1..4] {
+        assert_eq!(member["extensions"]["EXT_mesh_gpu_instancing"], instancing);
+        assert!(member["extensions"].get("EXT_instance_features").is_some());
     }
     // Origins lie on the square: half its diagonal, plus the mesh about its own origin.
     let radius = nodes[1]["extras"]["lodbake"]["radius"].as_f64().unwrap();
@@ -321,7 +321,7 @@ fn lines_are_repeated_and_empty_primitives_left_out() {
     assert_eq!((primitives.len(), &primitives[0]), (2, &lines));
     assert_eq!(document.json["nodes"][1]["extras"]["lodbake"]["facts"], json!([{ "stopped": "target" }]));
     // A level of which nothing is left is no level.
-    let levels = vec![level(&[nothing.clone()], 0.1)];
+    let levels = vec![level(std::slice::from_ref(&nothing), 0.1)];
     let mut one = square();
     let added =
         add_levels(&mut one, &[MeshLevels { mesh: 0, radius: 1.0, levels }], &Batches::new(), &EmitSettings::default());

@@ -1,0 +1,33 @@
+//! `lodbake schema KIND`: the JSON schema of a file that lodbake reads or writes, for editors and other programs.
+
+use super::{Context, Exit};
+use crate::{config, report};
+
+/// Write the JSON schema of a file format
+#[derive(Clone, Debug, clap::Args)]
+pub struct Schema {
+    /// The format
+    #[arg(value_enum)]
+    kind: Kind,
+}
+
+/// Formats with a published schema.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Kind {
+    /// `pipeline.toml`
+    Pipeline,
+    /// `report.json`
+    Report,
+}
+
+impl Schema {
+    /// Prints the schema.
+    pub fn run(&self, context: &Context) -> anyhow::Result<Exit> {
+        let schema = match self.kind {
+            Kind::Pipeline => config::schema(),
+            Kind::Report => report::schema(),
+        };
+        context.print(&format!("{schema:#}\n"))?;
+        Ok(Exit::Fine)
+    }
+}
