@@ -1,6 +1,7 @@
 //! Gives crude levels to every readable scene of the corpus, writes it in every format, reads it again: every rule
 //! holds, nothing is lost, and every level has the geometry that went in. The files stay in the folder `LODBAKE_KEEP`
 //! if that is set, for other tools to look at.
+#![expect(clippy::print_stdout, reason = "what was skipped and how much was checked is said aloud")]
 
 use lodbake::config::{EmitSettings, Profile};
 use lodbake::emit::{Content, Emission, Emitted, OutputFolder};
