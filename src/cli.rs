@@ -1,4 +1,4 @@
-//! The command line: words to [`Command`], errors to text and an exit code. Does no work of its own.
+//! The command line: words to `Command`, errors to text and an exit code. Does no work of its own.
 
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};

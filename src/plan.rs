@@ -138,7 +138,7 @@ impl Manifest for ChainManifest<'_> {
 }
 
 fn recipe(settings: &SceneSettings) -> Settings {
-    let SimplifySettings { metric, effort: _, weights, placement, lock_border } = &settings.simplify;
+    let SimplifySettings { metric, effort, weights, placement, lock_border } = &settings.simplify;
     Settings {
         metric: match metric {
             config::Metric::Its => MetricKind::Its,
@@ -151,6 +151,7 @@ fn recipe(settings: &SceneSettings) -> Settings {
         attributes: AttributeScale { normal: weights.normal, texcoord: weights.texcoord, color: weights.color },
         edges: EdgeWeights { border: weights.border, seam: weights.seam, crease: weights.crease },
         lock_border: *lock_border,
+        memoryless: *effort == config::Effort::Balanced,
     }
 }
 

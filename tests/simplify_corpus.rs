@@ -40,7 +40,7 @@ fn scene_files(folder: &Path, found: &mut Vec<PathBuf>) {
 fn settings(metric: MetricKind, placement: Placement) -> Settings {
     let attributes = AttributeScale { normal: 0.003, texcoord: 0.3, color: 0.1 };
     let edges = EdgeWeights { border: 1.0, seam: 0.3, crease: 0.01 };
-    Settings { metric, placement, attributes, edges, lock_border: false }
+    Settings { metric, placement, attributes, edges, lock_border: false, memoryless: true }
 }
 
 #[test]

@@ -3,7 +3,8 @@
 //! Each vertex carries the plane quadrics of its faces and of the borders, seams and creases at it; each wedge carries
 //! the quadrics of the linear attribute fields of its faces. A pair is priced by the least of their sum when every
 //! attribute takes its best value (Schur complement), so the merged position *and* the merged attributes are solved,
-//! never interpolated. Quadrics are rebuilt from the current surface after each contraction.
+//! never interpolated. Quadrics are rebuilt from the current surface after each contraction (effort `balanced`), or those
+//! of the merged vertices are added up (effort `fast`).
 //!
 //! Papers: H. Hoppe, *New quadric metric for simplifying meshes with appearance attributes*, 1999, sections 4 and 5
 //! (gradient form, wedges, memoryless); P. Lindstrom, G. Turk, *Fast and memory efficient polygonal simplification*,
@@ -41,6 +42,8 @@ struct FaceQuadric<const M: usize> {
 pub struct Its<const M: usize> {
     edges: EdgeWeights,
     placement: Placement,
+    /// Quadrics are rebuilt from the current surface; else those of merged vertices are added up.
+    memoryless: bool,
     faces: Vec<FaceQuadric<M>>,
     vertices: Vec<Quadric>,
     areas: Vec<f64>,
@@ -50,11 +53,12 @@ pub struct Its<const M: usize> {
 
 impl<const M: usize> Its<M> {
     /// Prepares the quadrics of the whole surface, which must have exactly `M` columns.
-    pub fn new(surface: &Topology, edges: EdgeWeights, placement: Placement) -> Self {
+    pub fn new(surface: &Topology, edges: EdgeWeights, placement: Placement, memoryless: bool) -> Self {
         assert!(surface.columns == M, "the metric is built for the surface's columns");
         let mut out = Self {
             edges,
             placement,
+            memoryless,
             faces: surface.faces.iter().map(|face| face_quadric(surface, face)).collect(),
             vertices: vec![Quadric::default(); surface.positions.len()],
             areas: vec![0.0; surface.positions.len()],
@@ -236,11 +240,11 @@ impl<const M: usize> ErrorMetric for Its<M> {
 
     fn contracted(&mut self, surface: &mut Topology, done: &Contraction) {
         let kept = done.kept;
+        for &[stays, goes] in &done.merged {
+            let gone = self.wedges[goes as usize];
+            self.wedges[stays as usize].add(&gone);
+        }
         if self.placement == Placement::Optimal && M > 0 {
-            for &[stays, goes] in &done.merged {
-                let gone = self.wedges[goes as usize];
-                self.wedges[stays as usize].add(&gone);
-            }
             let position = surface.positions[kept as usize];
             let mut wedge = surface.first_wedge(kept);
             while wedge != NONE {
@@ -249,6 +253,12 @@ impl<const M: usize> ErrorMetric for Its<M> {
                 }
                 wedge = surface.next_wedge(wedge);
             }
+        }
+        if !self.memoryless {
+            let gone = self.vertices[done.gone as usize];
+            self.vertices[kept as usize].add(&gone);
+            self.areas[kept as usize] += self.areas[done.gone as usize];
+            return;
         }
         for &id in surface.ring(kept) {
             self.faces[id as usize] = face_quadric(surface, &surface.faces[id as usize]);

@@ -49,6 +49,9 @@ pub struct Settings {
     pub edges: EdgeWeights,
     /// Vertices of open borders stay where they are.
     pub lock_border: bool,
+    /// Metrics that can, rebuild their state from the current surface after each contraction: closer to the source,
+    /// more work.
+    pub memoryless: bool,
 }
 
 /// Simplifies `mesh` as far as it goes and returns the recorded sequence.
@@ -76,7 +79,7 @@ fn build(surface: &mut Topology, settings: &Settings, locks: &Locks, recorder: R
         ($($m:literal)*) => {
             match width {
                 $($m => {
-                    let metric = Its::<$m>::new(surface, settings.edges, settings.placement);
+                    let metric = Its::<$m>::new(surface, settings.edges, settings.placement, settings.memoryless);
                     run(surface, metric, locks, recorder)
                 })*
                 _ => unreachable!("a width of the list"),

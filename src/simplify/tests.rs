@@ -13,12 +13,14 @@ const BALANCED: Settings = Settings {
     attributes: AttributeScale { normal: 0.003, texcoord: 0.3, color: 0.1 },
     edges: EdgeWeights { border: 1.0, seam: 0.3, crease: 0.01 },
     lock_border: false,
+    memoryless: true,
 };
 
 /// Every metric with every placement.
 fn all_settings() -> impl Iterator<Item = Settings> {
     MetricKind::ALL.into_iter().flat_map(|metric| {
-        [Placement::Optimal, Placement::Subset].map(|placement| Settings { metric, placement, ..BALANCED })
+        let places = [(Placement::Optimal, true), (Placement::Optimal, false), (Placement::Subset, true)];
+        places.map(|(placement, memoryless)| Settings { metric, placement, memoryless, ..BALANCED })
     })
 }
 
@@ -242,13 +244,13 @@ proptest! {
     fn any_soup_is_simplified_to_what_the_record_says(
         points in prop::collection::vec(prop::array::uniform3(-4i8..4), 3..24),
         corners in prop::collection::vec(0usize..1000, 3..90),
-        which in 0usize..4,
+        which in 0usize..6,
     ) {
         let count = points.len();
         let positions: Vec<f32> = points.iter().flatten().map(|&x| f32::from(x)).collect();
         let indices: Vec<u32> = corners.chunks_exact(3).flatten().map(|&i| (i % count) as u32).collect();
         let mesh = one(Primitive { count, attributes: vec![attribute("POSITION", 3, positions)], targets: Vec::new(), indices });
-        let settings = all_settings().nth(which).expect("four settings");
+        let settings = all_settings().nth(which).expect("six settings");
         let sequence = simplify(&mesh, &settings);
         for steps in [0, sequence.steps.len() / 2, sequence.steps.len()] {
             let left = triangles(&mesh, &sequence, steps);
