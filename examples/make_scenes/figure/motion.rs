@@ -73,8 +73,8 @@ fn idle(t: f64) -> Stance {
     let breath = sin(720.0 * t - 90.0);
     s.arms(24.0 + breath, [2.0 * breath, 2.0 * breath], 14.0);
     s.hips = DVec3::new(0.006 * sin(360.0 * t), -0.004 + 0.003 * breath, 0.0);
-    s.turn(Joint::Spine, -1.0 * breath, 2.0 * sin(360.0 * t), 0.0);
-    s.turn(Joint::Chest, 1.2 * breath, 0.0, -1.0 * sin(360.0 * t));
+    s.turn(Joint::Spine, -breath, 2.0 * sin(360.0 * t), 0.0);
+    s.turn(Joint::Chest, 1.2 * breath, 0.0, -sin(360.0 * t));
     s.turn(Joint::Head, -1.5 * breath, 9.0 * sin(360.0 * t), 4.0 * sin(360.0 * t + 30.0));
     s.turn(Joint::EarLeft, 0.0, 0.0, -10.0 * pulse(t, 0.62, 0.05));
     s.turn(Joint::EarRight, 0.0, 0.0, 8.0 * pulse(t, 0.66, 0.05));

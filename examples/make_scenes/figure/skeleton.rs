@@ -113,6 +113,7 @@ impl Shape {
 }
 
 /// Shapes of the left side and their joints; the right side mirrors them.
+#[expect(clippy::approx_constant, reason = "a place on the body, not a part of a circle")]
 const LEFT: [(Joint, Joint, Shape); 18] = [
     (EarLeft, EarRight, Shape::Blade([[0.12, 0.95, 0.0], [0.2, 1.185, -0.012]], [0.092, 0.01], 1.7)),
     (ArmLeft, ArmRight, Shape::Limb([[0.11, 0.565, 0.0], [0.235, 0.46, 0.005]], [0.056, 0.045])),
