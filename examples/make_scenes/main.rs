@@ -8,7 +8,6 @@
 
 mod coats;
 mod field;
-mod figure;
 mod gltf;
 mod noise;
 mod plaza;
@@ -38,7 +37,6 @@ impl File {
 fn files() -> Vec<File> {
     let mut files = props::files();
     files.extend(plaza::files());
-    files.extend(figure::files());
     files
 }
 

@@ -81,7 +81,9 @@ impl Thresholds {
 /// it. `errors` and `radius` are lengths in the mesh's units.
 pub fn switches(radius: f64, errors: &[f64], settings: &EmitSettings) -> Vec<(f64, f64)> {
     let thresholds = Thresholds::new(Extent { radius, scale: 1.0, batch: false }, errors, settings);
-    thresholds.coverage.into_iter().zip(thresholds.distances).collect()
+    // Where a number says at which size its level starts, the first one is level 0's.
+    let finest = usize::from(settings.profile == Profile::Unreal);
+    thresholds.coverage.into_iter().skip(finest).zip(thresholds.distances).collect()
 }
 
 #[cfg(test)]
@@ -147,6 +149,8 @@ mod tests {
         let settings = EmitSettings { profile: Profile::Unreal, ..EmitSettings::default() };
         let unreal = Thresholds::new(object(1.0), &[0.01, 0.02], &settings).coverage;
         assert_eq!(unreal, [1.0, web[0], web[1]]);
+        let shown = switches(1.0, &[0.01, 0.02], &settings);
+        assert_eq!(shown.iter().map(|(coverage, _)| *coverage).collect::<Vec<_>>(), web[..2]);
     }
 
     #[test]

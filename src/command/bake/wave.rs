@@ -25,7 +25,7 @@ use crate::key::JobKey;
 use crate::lod::Chain;
 use crate::mesh::hash::MeshHash;
 use crate::mesh::layout::frame;
-use crate::mesh::{Level, LevelPrimitive};
+use crate::mesh::{Level, LevelPrimitive, LevelVertices};
 use crate::obj;
 use crate::plan::{MeshPlan, Plan};
 use crate::progress::Event;
@@ -398,6 +398,16 @@ fn is_geometry(path: &str) -> bool {
 /// One sub-mesh at one level, shared by the meshes that have it; empty if it stays as the source.
 type SharedPart = Vec<Arc<LevelPrimitive>>;
 
+/// A level primitive whose indices into the source's vertices are those of the source's accessors: where triangles use
+/// only a part of them, that part was read and simplified.
+fn in_source(source: &SourceMesh, index: usize, level: &Arc<LevelPrimitive>) -> Arc<LevelPrimitive> {
+    if matches!(level.vertices, LevelVertices::Own(_)) || !source.vertex_maps.contains_key(&index) {
+        return level.clone();
+    }
+    let indices = source.source_indices(index, &level.indices).into_owned();
+    Arc::new(LevelPrimitive { indices, vertices: LevelVertices::Source })
+}
+
 /// The levels of every mesh that has a chain, put together from its sub-meshes.
 fn levels(scene: &ReadScene, chains: &BTreeMap<JobKey, Arc<Chain>>) -> Vec<MeshLevels> {
     let mut shared: BTreeMap<(JobKey, usize), Vec<SharedPart>> = BTreeMap::new();
@@ -416,7 +426,7 @@ fn levels(scene: &ReadScene, chains: &BTreeMap<JobKey, Arc<Chain>>) -> Vec<MeshL
             let mut primitives = vec![PrimitiveLevel::AsSource; source.primitives.len()];
             for (sub, part) in subs.iter().zip(parts.iter()) {
                 for (&index, primitive) in sub.primitives.iter().zip(part) {
-                    primitives[index] = PrimitiveLevel::Level(primitive.clone());
+                    primitives[index] = PrimitiveLevel::Level(in_source(source, index, primitive));
                 }
             }
             MeshLevel { primitives, error: level.error, facts: None }
