@@ -1,0 +1,103 @@
+//! Bakes the whole corpus with the program itself and checks every output against its source: all rules hold, nothing
+//! is lost, every level can be read again.
+
+use lodbake::gltf::read::read;
+use lodbake::gltf::scene::Scene;
+use lodbake::gltf::{json, rules};
+use std::path::{Path, PathBuf};
+
+/// The folder of real scenes, if this machine has it. CI must have it.
+fn corpus() -> Option<PathBuf> {
+    let folder = std::env::var_os("LODBAKE_CORPUS")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/corpus"), PathBuf::from);
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    assert!(std::env::var_os("CI").is_none(), "CI needs the corpus: set LODBAKE_CORPUS");
+    println!("SKIPPED: there is no corpus at `{}`; set LODBAKE_CORPUS", folder.display());
+    None
+}
+
+/// Levels in both kinds of storage, in both containers.
+fn pipeline(corpus: &Path) -> String {
+    format!(
+        "input = {input:?}\n\
+         output = 'out'\n\
+         include = ['features/**/*.gl*', 'scenes/**/*.gl*']\n\
+         lod = [{{ ratio = 0.5 }}, {{ ratio = 0.25 }}, {{ ratio = 0.1 }}]\n\
+         [[override]]\n\
+         match = 'features/**'\n\
+         storage = 'shared'\n\
+         [[override]]\n\
+         match = ['**/KHR_t*/**', '**/uv1*/**', '**/skin*/**']\n\
+         format = 'glb'\n",
+        input = corpus.canonicalize().unwrap().to_str().unwrap()
+    )
+}
+
+/// All scenes below a folder, in a stable order.
+fn scenes(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut open = vec![folder.to_owned()];
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                open.push(path);
+            } else if path.extension().is_some_and(|e| e == "gltf" || e == "glb") {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The source of an output, which may have been in the other container.
+fn source(corpus: &Path, output: &Path) -> Option<Scene> {
+    let same = corpus.join(output);
+    let candidates = [same.clone(), same.with_extension("gltf"), same.with_extension("glb")];
+    read(candidates.iter().find(|path| path.is_file())?).ok()
+}
+
+/// Levels of a scene and their triangles: none may be empty, none larger than the level before it.
+fn levels(scene: &Scene, place: &str) -> usize {
+    let nodes = scene.document.array("nodes").unwrap();
+    let mesh = |node: usize| &scene.meshes[json::index(&nodes[node], "mesh", place).unwrap().unwrap()];
+    let mut count = 0;
+    for (i, node) in nodes.iter().enumerate() {
+        let Some(lod) = json::extension(node, "MSFT_lod") else { continue };
+        let mut before = mesh(i).triangles();
+        for id in json::array(lod, "ids", place).unwrap() {
+            let now = mesh(id.as_u64().unwrap() as usize).triangles();
+            assert!(now > 0 && now <= before, "{place}: nodes[{id}] has {now} triangles after {before}");
+            before = now;
+            count += 1;
+        }
+    }
+    count
+}
+
+#[test]
+fn every_bake_of_the_corpus_keeps_the_rules() {
+    let Some(corpus) = corpus() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("pipeline.toml");
+    std::fs::write(&file, pipeline(&corpus)).unwrap();
+    let run = assert_cmd::Command::cargo_bin("lodbake").unwrap().arg(&file).output().unwrap();
+    let told = String::from_utf8_lossy(&run.stderr).into_owned();
+    let output = folder.path().join("out");
+    let (mut checked, mut total) = (0, 0);
+    for path in scenes(&output) {
+        let below = path.strip_prefix(&output).unwrap();
+        let place = below.display().to_string();
+        let before = source(&corpus, below).unwrap_or_else(|| panic!("{place} has no source"));
+        let after = read(&path).unwrap_or_else(|error| panic!("{error}"));
+        let violations = rules::check(&before.document, &after.document);
+        assert!(violations.is_empty(), "{place}: {violations:#?}");
+        checked += 1;
+        total += levels(&after, &place);
+    }
+    println!("{checked} outputs, {total} levels");
+    assert!(checked > 100 && total > 1000, "{checked} outputs, {total} levels\n{told}");
+}
