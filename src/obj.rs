@@ -4,6 +4,8 @@
 //! colour, opacity, shininess, emission and the textures of colour and bumps are carried over. Points, lines and free-form surfaces
 //! are left out.
 
+mod text;
+
 use crate::gltf::buffers::Buffers;
 use crate::gltf::dependencies::{Dependency, DependencyKind};
 use crate::gltf::document::{Container, Document, DocumentError};
@@ -25,7 +27,7 @@ pub fn read(path: &Path) -> Result<Scene, ReadError> {
     let bytes = std::fs::read(path).map_err(|e| ReadError::io(path, &e))?;
     let base = path.parent().unwrap_or(Path::new(""));
     let loaded =
-        load(&bytes, base).map_err(|e| ReadError { path: path.to_owned(), cause: ReadCause::Obj(e.to_string()) })?;
+        load(&bytes, base).map_err(|words| ReadError { path: path.to_owned(), cause: ReadCause::Obj(words) })?;
     let fault = |fault| ReadError::document(path, fault);
     let mut writer = Writer::new(loaded.materials, loaded.warnings);
     writer.add_models(loaded.models).map_err(fault)?;
@@ -46,17 +48,25 @@ struct Loaded {
     warnings: Vec<Warning>,
 }
 
-fn load(bytes: &[u8], base: &Path) -> Result<Loaded, tobj::LoadError> {
+/// Names and remarks in other encodings than UTF-8 are common; they lose a letter and nothing else.
+fn load(bytes: &[u8], base: &Path) -> Result<Loaded, String> {
+    let obj = String::from_utf8_lossy(bytes);
+    text::check_references(&obj).map_err(|e| e.to_string())?;
     let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
     let libraries: RefCell<BTreeMap<String, PathBuf>> = RefCell::default();
     let open_library = |name: &Path| {
         let written = name.to_string_lossy().into_owned();
         let path = base.join(written.replace('\\', "/"));
-        let text = std::fs::read(&path).map_err(|_| tobj::LoadError::OpenFileFailed)?;
+        let bytes = std::fs::read(&path).map_err(|_| tobj::LoadError::OpenFileFailed)?;
         libraries.borrow_mut().insert(written, path);
-        tobj::load_mtl_buf(&mut text.as_slice())
+        let mtl = String::from_utf8_lossy(&bytes);
+        match text::short_colour(&mtl) {
+            None => tobj::load_mtl_buf(&mut mtl.as_bytes()),
+            Some(_) => Err(tobj::LoadError::MaterialParseError),
+        }
     };
-    let (models, materials) = tobj::load_obj_buf(&mut &*bytes, &options, open_library)?;
+    let (models, materials) =
+        tobj::load_obj_buf(&mut obj.as_bytes(), &options, open_library).map_err(|e| e.to_string())?;
     let mut warnings = Vec::new();
     let materials = materials.unwrap_or_else(|error| {
         warnings.push(Warning { place: "mtllib".to_owned(), text: format!("materials are left out: {error}") });
@@ -360,8 +370,32 @@ Kd 1 1 1
         assert_eq!(scene.warnings[0].text, "materials are left out: open file failed");
         assert_eq!(scene.meshes.len(), 2);
         let broken = read(&folder.path().join("b.obj")).unwrap_err();
-        assert!(broken.to_string().ends_with("`: face vertex index out of bounds"), "{broken}");
+        assert!(broken.to_string().ends_with("`: line 2: vertex 3 is out of range (there are 1)"), "{broken}");
         assert!(read(&folder.path().join("c.obj")).unwrap().meshes.is_empty());
         assert!(read(&folder.path().join("d.obj")).unwrap_err().to_string().ends_with("`: there is no such file"));
+    }
+
+    #[test]
+    fn damaged_files_never_panic() {
+        let folder = folder(&[("paint.mtl", PAINT)]);
+        let base = folder.path();
+        let path = base.join("a.obj");
+        let words = ["-1", "0", "99999999999999999999", "1e999", "nan", "/", "//", "\\", "-", "f", "v", "o", "\n", "é"];
+        let mut state = 1u64;
+        let mut below = |limit: usize| {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 33) as usize % limit
+        };
+        let mut read_well = 0;
+        for _ in 0..600 {
+            let mut text = SQUARES.as_bytes().to_vec();
+            for _ in 0..=below(3) {
+                let at = below(text.len());
+                text.splice(at..at + below(2), words[below(words.len())].bytes());
+            }
+            std::fs::write(&path, text).unwrap();
+            read_well += usize::from(read(&path).is_ok());
+        }
+        assert!((1..600).contains(&read_well), "{read_well}");
     }
 }
