@@ -13,6 +13,25 @@ pub fn blend(a: f64, b: f64, soft: f64) -> f64 {
     a.min(b) - h * h * soft * 0.25
 }
 
+/// Distance to an ellipsoid (approximate away from its surface).
+pub fn ellipsoid(p: DVec3, middle: DVec3, radii: DVec3) -> f64 {
+    let q = p - middle;
+    let (near, slope) = ((q / radii).length(), (q / (radii * radii)).length());
+    if slope < 1e-9 { -radii.min_element() } else { near * (near - 1.0) / slope }
+}
+
+/// Distance to a cone with round ends: radius `ra` at `a`, `rb` at `b`.
+pub fn limb(p: DVec3, [a, b]: [DVec3; 2], [ra, rb]: [f64; 2]) -> f64 {
+    let (along, out) = (b - a, p - a);
+    let length = along.length();
+    let forth = out.dot(along) / length;
+    let aside = (out.length_squared() - forth * forth).max(0.0).sqrt();
+    // The side leans by the angle whose sine is `lean`; the nearest of the balls on the axis lies that much back.
+    let lean = ((ra - rb) / length).clamp(-0.95, 0.95);
+    let t = ((forth - aside * lean / (1.0 - lean * lean).sqrt()) / length).clamp(0.0, 1.0);
+    (out - along * t).length() - (ra + (rb - ra) * t)
+}
+
 /// Direction in which the field grows fastest.
 pub fn gradient(field: &impl Fn(DVec3) -> f64, p: DVec3, step: f64) -> DVec3 {
     let along = |d: DVec3| field(p + d * step) - field(p - d * step);
@@ -20,6 +39,7 @@ pub fn gradient(field: &impl Fn(DVec3) -> f64, p: DVec3, step: f64) -> DVec3 {
 }
 
 /// The surface where `field` is 0, which must lie inside the box from `low` to `high`; `cell` is the edge of a cell.
+/// The field must not change by more than twice the way: far from the surface, points are skipped.
 pub fn surface(low: DVec3, high: DVec3, cell: f64, field: impl Fn(DVec3) -> f64) -> Surface {
     let size = ((high - low) / cell).ceil().as_i64vec3() + 1;
     let index = |x: i64, y: i64, z: i64| ((z * size.y + y) * size.x + x) as usize;
@@ -27,7 +47,13 @@ pub fn surface(low: DVec3, high: DVec3, cell: f64, field: impl Fn(DVec3) -> f64)
     let mut values = Vec::with_capacity((size.x * size.y * size.z) as usize);
     for z in 0..size.z {
         for y in 0..size.y {
-            values.extend((0..size.x).map(|x| field(point(x, y, z))));
+            let mut x = 0;
+            while x < size.x {
+                let value = field(point(x, y, z));
+                let alike = 1 + (value.abs() / (2.0 * cell)) as i64;
+                values.extend((x..size.x.min(x + alike)).map(|_| value));
+                x += alike;
+            }
         }
     }
     let mut net = Net { surface: Surface::default(), vertices: BTreeMap::new() };

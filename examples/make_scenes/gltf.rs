@@ -189,7 +189,36 @@ impl Document {
 
     fn target(&mut self, target: &[[DVec3; 2]]) -> Value {
         let (positions, normals): (Vec<DVec3>, Vec<DVec3>) = target.iter().map(|[p, n]| (*p, *n)).unzip();
-        json!({ "POSITION": self.vectors(&positions, true), "NORMAL": self.vectors(&normals, false) })
+        json!({ "POSITION": self.sparse(&positions, true), "NORMAL": self.sparse(&normals, false) })
+    }
+
+    /// An accessor that is zero but for a few vertices: sparse, without a buffer view of its own.
+    fn sparse(&mut self, vectors: &[DVec3], bounds: bool) -> usize {
+        let values: Vec<f32> = vectors.iter().flat_map(|v| v.as_vec3().to_array()).collect();
+        let mut kept: Vec<usize> = (0..vectors.len()).filter(|i| vectors[*i].length_squared() > 1e-12).collect();
+        if kept.is_empty() {
+            // A sparse accessor must name one element at least.
+            kept.push(0);
+        }
+        let indices: Vec<u16> = kept.iter().map(|i| *i as u16).collect();
+        let changed: Vec<f32> = kept.iter().flat_map(|i| values[i * 3..i * 3 + 3].to_vec()).collect();
+        let indices = self.view(bytemuck::cast_slice(&indices), None);
+        let changed = self.view(bytemuck::cast_slice(&changed), None);
+        let accessor = self.push(
+            "accessors",
+            json!({
+                "componentType": 5126, "count": vectors.len(), "type": "VEC3",
+                "sparse": {
+                    "count": kept.len(),
+                    "indices": { "bufferView": indices, "componentType": 5123 },
+                    "values": { "bufferView": changed },
+                },
+            }),
+        );
+        if bounds {
+            self.bound(accessor, 3, &values);
+        }
+        accessor
     }
 
     /// A node; `what` holds `mesh`, `children`, `camera` and the like.
@@ -237,6 +266,16 @@ impl Document {
     pub fn floats(&mut self, kind: &str, values: &[f32]) -> usize {
         let view = self.view(bytemuck::cast_slice(values), Some(34962));
         self.accessor(view, 5126, kind, values.len())
+    }
+
+    /// An accessor of floats for an animation or a skin: not bound to the vertex stage.
+    pub fn curve(&mut self, kind: &str, values: &[f32]) -> usize {
+        let view = self.view(bytemuck::cast_slice(values), None);
+        let accessor = self.accessor(view, 5126, kind, values.len());
+        if kind == "SCALAR" {
+            self.bound(accessor, 1, values);
+        }
+        accessor
     }
 
     fn bytes(&mut self, kind: &str, values: &[u8], normalized: bool) -> usize {

@@ -8,6 +8,7 @@
 
 mod coats;
 mod field;
+mod figure;
 mod gltf;
 mod noise;
 mod plaza;
@@ -37,6 +38,7 @@ impl File {
 fn files() -> Vec<File> {
     let mut files = props::files();
     files.extend(plaza::files());
+    files.extend(figure::files());
     files
 }
 
