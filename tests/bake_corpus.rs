@@ -1,6 +1,8 @@
 //! Bakes the whole corpus with the program itself and checks every output against its source: all rules hold, nothing
 //! is lost, every level can be read again.
 
+#![allow(clippy::print_stdout)] // a test that skips must say so
+
 use lodbake::gltf::read::read;
 use lodbake::gltf::scene::Scene;
 use lodbake::gltf::{json, rules};

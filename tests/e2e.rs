@@ -5,9 +5,15 @@ mod scene;
 #[path = "e2e/space.rs"]
 mod space;
 
-#[path = "e2e/usage.rs"]
-mod usage;
-#[path = "e2e/inspect.rs"]
-mod inspect;
 #[path = "e2e/bake.rs"]
 mod bake;
+#[path = "e2e/cache.rs"]
+mod cache;
+#[path = "e2e/explain.rs"]
+mod explain;
+#[path = "e2e/init.rs"]
+mod init;
+#[path = "e2e/inspect.rs"]
+mod inspect;
+#[path = "e2e/usage.rs"]
+mod usage;

@@ -1,7 +1,7 @@
 //! `lodbake schema KIND`: the JSON schema of a file that lodbake reads or writes, for editors and other programs.
 
 use super::{Context, Exit};
-use crate::{config, report};
+use crate::{config, progress, report};
 
 /// Write the JSON schema of a file format
 #[derive(Clone, Debug, clap::Args)]
@@ -18,6 +18,10 @@ enum Kind {
     Pipeline,
     /// `report.json`
     Report,
+    /// One line of `lodbake bake --json`
+    Events,
+    /// `lodbake inspect --json FILE`
+    Inspection,
 }
 
 impl Schema {
@@ -26,6 +30,8 @@ impl Schema {
         let schema = match self.kind {
             Kind::Pipeline => config::schema(),
             Kind::Report => report::schema(),
+            Kind::Events => progress::schema(),
+            Kind::Inspection => report::inspection::schema(),
         };
         context.print(&format!("{schema:#}\n"))?;
         Ok(Exit::Fine)

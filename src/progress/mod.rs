@@ -170,6 +170,11 @@ pub trait Reporter: Sync + Send {
     fn event(&self, event: &Event);
 }
 
+/// The JSON schema of one line of `--json`.
+pub fn schema() -> serde_json::Value {
+    schemars::schema_for!(Event).to_value()
+}
+
 /// Tells nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;

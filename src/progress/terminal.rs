@@ -89,14 +89,13 @@ impl Terminal {
         change(&mut state);
         let (what, number) = match state.phase {
             Phase::Reading => ("reading", state.read),
-            Phase::Writing => ("writing", state.done),
+            Phase::Writing => ("scenes", state.done),
         };
-        let label = format!("{}/{}", count(number), count(state.files));
+        let label = format!("{what} {}/{}", count(number), count(state.files));
         let position = state.read + state.done;
         drop(state);
-        self.files.set_prefix(what);
+        self.files.set_prefix(label);
         self.files.set_position(position);
-        self.files.set_message(label);
     }
 
     fn planned(&self, jobs: u64, triangles: u64) {
@@ -111,7 +110,6 @@ impl Terminal {
         self.jobs.set_length(self.jobs.length().unwrap_or(0) + triangles);
         if is_first {
             self.bars.add(self.jobs.clone());
-            self.jobs.set_prefix("baking");
             self.jobs.reset_elapsed();
             self.jobs.reset_eta();
             self.jobs.enable_steady_tick(TICK);
@@ -139,12 +137,15 @@ impl Terminal {
         self.describe_jobs();
     }
 
-    /// `31/80  now 115 k triangles`: the largest mesh in work is the one people wait for.
+    /// `baking 31/80`, and at the end of the line `now 115 k tri`: the largest mesh in work is what people wait for.
     fn describe_jobs(&self) {
         let state = self.state();
+        let label = format!("baking {}/{}", count(state.meshes_done), count(state.meshes));
         let largest = state.running.iter().map(|(_, triangles)| *triangles).max();
-        let now = largest.map(|triangles| format!("  now {} triangles", short(triangles as f64))).unwrap_or_default();
-        self.jobs.set_message(format!("{}/{}{now}", count(state.meshes_done), count(state.meshes)));
+        drop(state);
+        self.jobs.set_prefix(label);
+        let now = largest.map(|triangles| format!("now {} tri", short(triangles as f64)));
+        self.jobs.set_message(now.unwrap_or_default());
     }
 
     fn scene_done(&self) {
@@ -216,13 +217,12 @@ impl Drop for Terminal {
 }
 
 fn files_style() -> ProgressStyle {
-    ProgressStyle::with_template("{prefix:>8} {bar:24} {msg}")
-        .expect("the template is a constant")
-        .progress_chars("━╸ ")
+    ProgressStyle::with_template("{prefix:<19} {bar:20}").expect("the template is a constant").progress_chars("━╸ ")
 }
 
+/// 19 + 20 columns and a rate of about 25 leave room for the message on a terminal of 80; what is too long is cut.
 fn jobs_style() -> ProgressStyle {
-    ProgressStyle::with_template("{prefix:>8} {bar:24} {msg}  {rate}")
+    ProgressStyle::with_template("{prefix:<19} {bar:20} {rate} {wide_msg}")
         .expect("the template is a constant")
         .with_key("rate", write_rate)
         .progress_chars("━╸ ")
@@ -233,11 +233,15 @@ fn remaining(time: Duration) -> String {
     if time < Duration::from_secs(60) { format!("{:.0} s", time.as_secs_f64().ceil()) } else { duration(time) }
 }
 
-/// `1.2 M triangles/s, 12 s left`, once there is something to go by.
+/// `1.2 M tri/s, 12 s left`, once there is something to go by.
 fn write_rate(state: &ProgressState, to: &mut dyn fmt::Write) {
     if state.pos() == 0 || state.elapsed() < RATE_AFTER {
         return;
     }
-    let written = write!(to, "{} triangles/s, {} left", short(state.per_sec()), remaining(state.eta()));
+    let rate = short(state.per_sec());
+    let written = match state.len() {
+        Some(length) if state.pos() < length => write!(to, "{rate} tri/s, {} left", remaining(state.eta())),
+        _ => write!(to, "{rate} tri/s"),
+    };
     written.expect("a line in memory can be written");
 }
