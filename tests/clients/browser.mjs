@@ -4,7 +4,7 @@ import { existsSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { build } from 'esbuild';
+import { build, stop } from 'esbuild';
 import { chromium } from 'playwright-core';
 import { serve } from './server.mjs';
 
@@ -23,6 +23,9 @@ const FLAGS = [
   '--disable-dev-shm-usage',
   '--force-color-profile=srgb',
 ];
+
+/** A page must have its engine by then: seconds alone, more on a busy machine. */
+const START_LIMIT_MS = 120_000;
 
 function chromiumPath() {
   const found = [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/chromium-browser'].find((p) => p && existsSync(p));
@@ -45,6 +48,7 @@ async function bundle(engines, folder) {
     const html = `<!doctype html><meta charset="utf-8"><title>${engine}</title><body><script type="module" src="${engine}.js"></script>`;
     await writeFile(path.join(folder, `${engine}.html`), html);
   }
+  await stop(); // its helper process would keep half a gigabyte
 }
 
 /** A server and a browser with the pages of `engines` ready to open. Call `close` at the end. */
@@ -52,7 +56,7 @@ export async function open(engines) {
   const folder = await mkdtemp(path.join(tmpdir(), 'lodbake-clients-'));
   await bundle(engines, folder);
   const server = await serve(folder);
-  const browser = await chromium.launch({ executablePath: chromiumPath(), headless: true, chromiumSandbox: false, args: FLAGS });
+  const browser = await chromium.launch({ executablePath: chromiumPath(), headless: true, chromiumSandbox: false, args: FLAGS, timeout: START_LIMIT_MS });
   const modules = path.join(HERE, 'node_modules');
   const urls = {
     draco: `${server.url(path.join(modules, 'three/examples/jsm/libs/draco/gltf'))}/`,
@@ -64,6 +68,7 @@ export async function open(engines) {
     /** Opens a fresh page of `engine`; `onError(kind, text)` hears console errors, page errors and failed requests. */
     async page(engine, onError = () => {}) {
       const page = await browser.newPage();
+      page.setDefaultTimeout(START_LIMIT_MS);
       page.on('console', (message) => {
         // Failed requests are heard below, with their status.
         if (message.type() === 'error' && !message.text().startsWith('Failed to load resource')) onError('console', message.text());
@@ -73,7 +78,7 @@ export async function open(engines) {
         if (response.status() >= 400 && !response.url().endsWith('/favicon.ico')) onError('http', `${response.status()} ${response.url()}`);
       });
       await page.goto(server.page(`${engine}.html`));
-      await page.waitForFunction(() => globalThis.client !== undefined);
+      await page.waitForFunction(() => globalThis.client !== undefined, null, { polling: 100 });
       await page.evaluate((where) => globalThis.client.start(where), urls);
       return page;
     },

@@ -7,7 +7,7 @@ import { parseArgs } from 'node:util';
 import { open } from './browser.mjs';
 import { groups, pairUp, readDocument } from './document.mjs';
 
-const USAGE = `usage: node load.mjs SOURCE_DIR OUTPUT_DIR [--engine three|babylon] [--only TEXT] [--pictures DIR] [--size N] [--slowest N]
+const USAGE = `usage: node load.mjs SOURCE_DIR OUTPUT_DIR [SOURCE_DIR OUTPUT_DIR]... [--engine three|babylon] [--only TEXT] [--pictures DIR] [--size N] [--slowest N]
   --engine    one engine only (default: both, side by side)
   --only      files whose path contains TEXT
   --pictures  where to put source and output pictures that differ
@@ -15,7 +15,7 @@ const USAGE = `usage: node load.mjs SOURCE_DIR OUTPUT_DIR [--engine three|babylo
   --slowest   lists the N files that took longest`;
 
 /** One file may take this long in one engine: software GL, two cores. */
-const FILE_LIMIT_MS = 90_000;
+const FILE_LIMIT_MS = 120_000;
 /** A fresh page now and then keeps one file's leftovers from another's verdict, and memory flat. */
 const FILES_PER_PAGE = 20;
 /** Babylon loads a file anew for each level it shows; above this many bytes only the coarsest is tried. */
@@ -104,7 +104,7 @@ async function judge(client, engine, pair, plan) {
       client.errors.push(error.message.split('\n')[0]);
       return null;
     });
-    return { result, errors: client.errors.map(client.anonymous) };
+    return { result, errors: client.errors.map((text) => client.anonymous(text).replaceAll(pair.root, '')) };
   };
   const before = await step('source', pair.source, { anchors: {}, ranges: false });
   const after = await step('output', pair.output, { ranges: false });
@@ -134,7 +134,7 @@ async function runEngine(browser, engine, pairs, options) {
   const client = {
     errors,
     url: browser.server.url,
-    anonymous: (text) => browser.server.anonymous(text).replaceAll(options.root, ''),
+    anonymous: (text) => browser.server.anonymous(text),
     keep: async (pair, shot) => {
       if (!options.pictures) return;
       for (const which of ['source', 'output']) {
@@ -194,15 +194,18 @@ function idleEngines(verdicts) {
   });
 }
 
-/** Judges every pair below two folders; returns the verdicts. */
-export async function run(source, output, options) {
-  const { pairs, missing } = await pairUp(source, output);
+/** Judges every pair below `folders` = [[source, output], ..]; returns the verdicts and the sources without an output. */
+export async function run(folders, options) {
+  const found = await Promise.all(folders.map(([source, output]) => pairUp(source, output)));
+  const labelled = (i, name) => (folders.length > 1 ? `${path.basename(folders[i][0])}/${name}` : name);
+  const pairs = found.flatMap((one, i) => one.pairs.map((pair) => ({ ...pair, name: labelled(i, pair.name), root: path.resolve(folders[i][0]) })));
+  const missing = found.flatMap((one, i) => one.missing.map((name) => labelled(i, name)));
   const chosen = pairs.filter((pair) => !options.only || pair.name.includes(options.only));
-  if (chosen.length === 0) throw new Error(`no output of ${source} found in ${output}`);
+  if (chosen.length === 0) throw new Error('no source has an output');
   const engines = options.engine ? [options.engine] : ['three', 'babylon'];
   const browser = await open(engines);
   try {
-    const settings = { size: 256, root: path.resolve(source), ...options };
+    const settings = { size: 256, ...options };
     const verdicts = (await Promise.all(engines.map((engine) => runEngine(browser, engine, chosen, settings)))).flat();
     return { verdicts, missing };
   } finally {
@@ -221,9 +224,10 @@ async function main() {
       slowest: { type: 'string', default: '0' },
     },
   });
-  if (positionals.length !== 2) throw new Error(USAGE);
+  if (positionals.length === 0 || positionals.length % 2 !== 0) throw new Error(USAGE);
+  const folders = Array.from({ length: positionals.length / 2 }, (_, i) => positionals.slice(2 * i, 2 * i + 2));
   const start = Date.now();
-  const { verdicts, missing } = await run(positionals[0], positionals[1], { ...values, size: Number(values.size) });
+  const { verdicts, missing } = await run(folders, { ...values, size: Number(values.size) });
   const idle = idleEngines(verdicts);
   const failed = tell(verdicts, Number(values.slowest)) + idle.length;
   for (const engine of idle) console.log(`\n${engine} reads less than ${100 * (1 - MOST_UNREAD)} % of the sources: is it set up right?`);

@@ -117,7 +117,7 @@ async function main() {
     await writeDocument(path.join(output, `${name}.gltf`), { json: baked });
   }
   const found = new Map(Object.keys(cases).map((name) => [name, []]));
-  const { verdicts } = await run(source, output, {});
+  const { verdicts } = await run([[source, output]], {});
   for (const { pair, wrong } of verdicts) found.get(path.parse(pair.name).name).push(...wrong);
   for (const name of found.keys()) {
     const pair = { source: path.join(source, `${name}.gltf`), output: path.join(output, `${name}.gltf`) };

@@ -29,7 +29,6 @@ let head;
 
 function start(urls) {
   const canvas = document.createElement('canvas');
-  document.body.append(canvas);
   engine = new Engine(canvas, false, { preserveDrawingBuffer: true, stencil: false, powerPreference: 'low-power', audioEngine: false });
   engine.enableOfflineSupport = false;
   engine.disableManifestCheck = true;
@@ -75,6 +74,7 @@ async function load(url, options) {
     // Instances batched in the order of loading would draw coplanar faces in another order than the source.
     createInstances: false,
     useRangeRequests: options.ranges ?? false,
+    skipMaterials: options.bare ?? false,
     extensionOptions: { MSFT_lod: { maxLODsToLoad: options.lods ?? 100 } },
   };
   await AppendSceneAsync(url, scene, { pluginOptions: { gltf } });
@@ -175,12 +175,12 @@ function facts() {
   };
 }
 
-/** Babylon keeps no levels: each is seen by loading the file only as far as that level. */
+/** Babylon keeps no levels: each is seen by loading the file only as far as that level (without images, to be quick). */
 async function levels(url, options, view) {
   const found = [];
   for (let lods = 1; lods < options.levels; lods++) {
     if (lods > 1 && options.coarsestOnly) break;
-    const arrived = await load(url, { ...options, lods });
+    const arrived = await load(url, { ...options, lods, bare: true });
     const pixels = covered(await draw(view, view.size));
     found.unshift({ level: options.levels - lods, arrived, triangles: Math.round(triangles()), pixels });
   }

@@ -19,7 +19,6 @@ function start(urls) {
   renderer = new THREE.WebGLRenderer({ antialias: false, preserveDrawingBuffer: true });
   renderer.setPixelRatio(1);
   renderer.setClearColor(0x000000, 0);
-  document.body.append(renderer.domElement);
   const draco = new DRACOLoader().setDecoderPath(urls.draco);
   const ktx2 = new KTX2Loader().setTranscoderPath(urls.basis).detectSupport(renderer);
   loader = new GLTFLoader().setDRACOLoader(draco).setKTX2Loader(ktx2).setMeshoptDecoder(MeshoptDecoder);
