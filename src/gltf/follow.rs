@@ -11,7 +11,10 @@ use super::instancing::MOVE_WITH_MESH;
 use super::json;
 use super::notes::Notes;
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// In the target of a channel.
+const POINTER: &str = "/extensions/KHR_animation_pointer/pointer";
 
 /// One lower level of a group.
 #[derive(Clone, Copy, Debug)]
@@ -22,12 +25,13 @@ pub(super) struct LevelNode {
     pub(super) targets: bool,
 }
 
-/// One mesh that moved from a node to its new child.
+/// One mesh that moved from a node to one below it.
 #[derive(Clone, Debug)]
 pub(super) struct Moved {
     /// Where it was: the anchor.
     pub(super) node: usize,
-    pub(super) child: usize,
+    /// Where it is now: the appended child, or the child of that one.
+    pub(super) carrier: usize,
     pub(super) mesh: usize,
     /// The copy that the child uses instead of `mesh`, if it had to be repeated.
     pub(super) repeated: Option<usize>,
@@ -43,6 +47,27 @@ impl Moved {
     fn all_levels(&self) -> Vec<usize> {
         self.levels.iter().map(|level| level.node).collect()
     }
+}
+
+/// Nodes whose morph weights an animation drives, by a channel or by a pointer.
+pub(super) fn nodes_with_driven_weights(document: &Document) -> Result<BTreeSet<usize>, DocumentError> {
+    let mut driven = BTreeSet::new();
+    for animation in document.array("animations")? {
+        let channels = animation.get("channels").and_then(Value::as_array);
+        for target in channels.into_iter().flatten().filter_map(|channel| channel.get("target")) {
+            if target["path"] == "weights" {
+                driven.extend(target.get("node").and_then(json::integer).map(|node| node as usize));
+            }
+            let pointer = target.pointer(POINTER).and_then(Value::as_str);
+            let below = pointer.and_then(|text| text.strip_prefix("/nodes/")?.split_once('/'));
+            if let Some((node, rest)) = below
+                && rest.split('/').next() == Some("weights")
+            {
+                driven.extend(node.parse::<usize>());
+            }
+        }
+    }
+    Ok(driven)
 }
 
 /// Mends all references in the document.
@@ -142,12 +167,12 @@ impl<'a> Trail<'a> {
             copy["target"]["node"] = json!(level);
             repeated.push(copy);
         }
-        channel["target"]["node"] = json!(moved.child);
+        channel["target"]["node"] = json!(moved.carrier);
     }
 
     fn pointer_channel(&self, channel: &mut Value, repeated: &mut Vec<Value>) {
-        const PLACE: &str = "/target/extensions/KHR_animation_pointer/pointer";
-        let Some(text) = channel.pointer(PLACE).and_then(Value::as_str).map(str::to_owned) else { return };
+        let Some(target) = channel.get("target") else { return };
+        let Some(text) = target.pointer(POINTER).and_then(Value::as_str).map(str::to_owned) else { return };
         let mut others = Vec::new();
         if let Some(pointer) = self.pointer(&text) {
             others.extend(pointer.levels().into_iter().map(|node| pointer.to(node)));
@@ -160,7 +185,7 @@ impl<'a> Trail<'a> {
         }
         for other in others {
             let mut copy = channel.clone();
-            if let Some(place) = copy.pointer_mut(PLACE) {
+            if let Some(place) = copy["target"].pointer_mut(POINTER) {
                 *place = other;
             }
             repeated.push(copy);
@@ -172,7 +197,7 @@ impl<'a> Trail<'a> {
         match value {
             Value::String(text) if inside => {
                 if let Some(pointer) = self.pointer(text) {
-                    let target = pointer.to(pointer.moved.child);
+                    let target = pointer.to(pointer.moved.carrier);
                     if root != "animations" {
                         notes
                             .add(root, "a pointer follows its mesh to the added child and does not drive lower levels");
@@ -223,7 +248,7 @@ impl<'a> Trail<'a> {
             let others = if key == "mesh" {
                 self.level_meshes(index, weights)
             } else if let Some(moved) = self.nodes.get(&index) {
-                entry[key] = json!(moved.child);
+                entry[key] = json!(moved.carrier);
                 if weights { moved.with_targets() } else { moved.all_levels() }
             } else {
                 continue;
@@ -244,7 +269,7 @@ impl<'a> Trail<'a> {
             let Some(shape) = node.pointer_mut(&place) else { continue };
             let moved = json::integer(shape).and_then(|index| self.nodes.get(&(index as usize)));
             if let Some(moved) = moved {
-                *shape = json!(moved.child);
+                *shape = json!(moved.carrier);
             }
         }
     }

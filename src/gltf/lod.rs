@@ -7,6 +7,9 @@
 //! L1, L2, ...: appended, no transform, a mesh each, in no scene, nobody's children
 //! ```
 //!
+//! Where an animation drives the morph weights, the mesh sits one node further down: three.js makes the node with the
+//! extension a `LOD` object, which has no weights to drive. The child then has only the extension and one child.
+//!
 //! Readers disagree on whether level nodes are siblings or children of the node with the extension and whether their
 //! transforms count; without transforms the difference vanishes. Nothing that exists is renumbered; what moves is
 //! written down in `follow` and `instancing`. Knows nothing of how levels are made.
@@ -308,6 +311,16 @@ fn write_chains(
     Ok(written)
 }
 
+/// A node that becomes a group.
+struct Anchor {
+    node: usize,
+    mesh: usize,
+    /// The copy that level 0 shows instead of `mesh`.
+    repeated: Option<usize>,
+    /// An animation drives its morph weights.
+    driven: bool,
+}
+
 /// Turns nodes into groups.
 struct Grouping<'a> {
     chains: &'a BTreeMap<usize, Chain<'a>>,
@@ -325,35 +338,37 @@ impl Grouping<'_> {
             notes.add(format_args!("meshes[{mesh}]"), "the source uses this mesh as a lower level; it is repeated");
         }
         let mut names = Names::new(document, self.settings.profile);
+        let driven = follow::nodes_with_driven_weights(document)?;
         let mut moved = Vec::new();
         for &(node, mesh) in &anchors.nodes {
             carry::note_staying(&document.array("nodes")?[node], node, notes);
-            moved.push(self.group(document, node, (mesh, repeated.get(&mesh).copied()), &mut names)?);
+            let anchor = Anchor { node, mesh, repeated: repeated.get(&mesh).copied(), driven: driven.contains(&node) };
+            moved.push(self.group(document, &anchor, &mut names)?);
         }
         Ok(moved)
     }
 
-    fn group(
-        &self,
-        document: &mut Document,
-        anchor: usize,
-        (mesh, repeated): (usize, Option<usize>),
-        names: &mut Option<Names>,
-    ) -> Result<Moved, WriteError> {
-        let written = &self.written[&mesh];
-        let thresholds = self.thresholds(document, anchor, mesh);
+    fn group(&self, document: &mut Document, anchor: &Anchor, names: &mut Option<Names>) -> Result<Moved, WriteError> {
+        let written = &self.written[&anchor.mesh];
+        let thresholds = self.thresholds(document, anchor.node, anchor.mesh);
         let nodes = document.array_mut("nodes")?;
         let child = nodes.len();
         let levels: Vec<LevelNode> = (written.meshes.iter().zip(&written.targets).enumerate())
             .map(|(i, (&mesh, &targets))| LevelNode { node: child + 1 + i, mesh, targets })
             .collect();
-        let Value::Object(source) = &mut nodes[anchor] else { unreachable!("`Anchors::find` read its mesh") };
-        let names = names.as_mut().map(|names| names.group(source, anchor, levels.len() + 1));
+        let Value::Object(source) = &mut nodes[anchor.node] else { unreachable!("`Anchors::find` read its mesh") };
+        let names = names.as_mut().map(|names| names.group(source, anchor.node, levels.len() + 1));
         let parts = Parts::take(source, child);
-        let mut entry = parts.node(repeated.unwrap_or(mesh), true);
+        let finest = parts.node(anchor.repeated.unwrap_or(anchor.mesh), true);
+        let carrier = if anchor.driven { child + 1 + levels.len() } else { child };
+        let (mut entry, below) = if anchor.driven {
+            (Map::from_iter([("children".to_owned(), json!([carrier]))]), Some(finest))
+        } else {
+            (finest, None)
+        };
         let ids: Vec<usize> = levels.iter().map(|level| level.node).collect();
         entry.entry("extensions").or_insert_with(|| json!({}))[MSFT_LOD] = json!({ "ids": ids });
-        let facts = self.facts(mesh, &thresholds);
+        let facts = self.facts(anchor.mesh, &thresholds);
         entry.insert("extras".to_owned(), json!({ "MSFT_screencoverage": thresholds.coverage, "lodbake": facts }));
         let lower = levels.iter().map(|level| parts.node(level.mesh, level.targets));
         for (number, mut node) in std::iter::once(entry).chain(lower).enumerate() {
@@ -362,7 +377,8 @@ impl Grouping<'_> {
             }
             nodes.push(Value::Object(node));
         }
-        Ok(Moved { node: anchor, child, mesh, repeated, levels })
+        nodes.extend(below.map(Value::Object));
+        Ok(Moved { node: anchor.node, carrier, mesh: anchor.mesh, repeated: anchor.repeated, levels })
     }
 
     fn thresholds(&self, document: &Document, node: usize, mesh: usize) -> Thresholds {

@@ -145,12 +145,17 @@ fn morph_animated() -> Document {
 fn animated_weights_drive_every_level_and_transforms_the_anchor() {
     let (document, _) = bake(&morph_animated(), &[chain(0, &own(1), &shared())]);
     let expected = json!([
-        { "sampler": 1, "target": { "node": 1, "path": "weights" } },
+        { "sampler": 1, "target": { "node": 4, "path": "weights" } },
         { "sampler": 0, "target": { "node": 0, "path": "translation" } },
         { "sampler": 1, "target": { "node": 2, "path": "weights" } },
         { "sampler": 1, "target": { "node": 3, "path": "weights" } },
     ]);
     assert_eq!(document.json["animations"][0]["channels"], expected);
+    // The node with the levels shows nothing itself: three.js would find no weights on it.
+    let nodes = &document.json["nodes"];
+    assert_eq!((&nodes[0]["children"], &nodes[1]["children"]), (&json!([1]), &json!([4])));
+    assert_eq!(nodes[1].get("mesh"), None);
+    assert_eq!(nodes[4]["mesh"], 0);
 }
 
 #[test]
@@ -190,7 +195,7 @@ fn pointers_follow_what_moved_and_nothing_else() {
         .map(|c| c["target"]["extensions"]["KHR_animation_pointer"]["pointer"].as_str().unwrap())
         .collect();
     let expected = [
-        "/nodes/1/weights/0",
+        "/nodes/4/weights/0",
         "/nodes/0/rotation",
         "/meshes/0/weights",
         "/nodes/0/extensions/KHR_node_visibility/visible",
@@ -200,7 +205,7 @@ fn pointers_follow_what_moved_and_nothing_else() {
         "/meshes/2/weights",
     ];
     assert_eq!(pointers, expected);
-    assert_eq!(document.json["extensions"]["VENDOR_x"]["a"][0], "/nodes/1/weights");
+    assert_eq!(document.json["extensions"]["VENDOR_x"]["a"][0], "/nodes/4/weights");
     assert_eq!(document.json["extras"], source.json["extras"], "what users keep to themselves stays");
     assert_eq!(added.notes.len(), 2, "{:?}", added.notes);
 }
@@ -224,8 +229,8 @@ fn avatars_keep_their_expressions() {
         let list = document.json["extensions"].pointer(place).unwrap().as_array().unwrap();
         list.iter().map(|entry| entry[key].as_u64().unwrap()).collect()
     };
-    assert_eq!(list("/VRMC_vrm/expressions/preset/happy/morphTargetBinds", "node"), [1, 2, 3]);
-    assert_eq!(list("/VRMC_vrm/firstPerson/meshAnnotations", "node"), [1, 2, 3]);
+    assert_eq!(list("/VRMC_vrm/expressions/preset/happy/morphTargetBinds", "node"), [4, 2, 3]);
+    assert_eq!(list("/VRMC_vrm/firstPerson/meshAnnotations", "node"), [4, 2, 3]);
     assert_eq!(list("/VRM/blendShapeMaster/blendShapeGroups/0/binds", "mesh"), [0, 1, 2]);
     assert_eq!(list("/VRM/firstPerson/meshAnnotations", "mesh"), [0, 1, 2]);
     assert_eq!(document.json["extensions"]["VRMC_vrm"]["humanoid"], source.json["extensions"]["VRMC_vrm"]["humanoid"]);

@@ -20,6 +20,8 @@ pub(super) struct Group {
     pub(super) anchor: usize,
     /// Carries the extension.
     pub(super) child: usize,
+    /// Shows level 0: the child, or the only child of that one where morph weights are animated.
+    pub(super) carrier: usize,
     /// Finest first.
     pub(super) levels: Vec<usize>,
 }
@@ -61,7 +63,11 @@ impl Group {
             let sound = !levels.is_empty() && levels.iter().all(|&level| level >= old && level < nodes.len());
             found.require(sound, Rule::Roles, &place, "`MSFT_lod.ids` are not appended nodes");
             if sound {
-                groups.push(Self { anchor, child, levels });
+                let carrier = match indices(&nodes[child], "children")[..] {
+                    [below] if below >= old && below < nodes.len() && index(&nodes[child], "mesh").is_none() => below,
+                    _ => child,
+                };
+                groups.push(Self { anchor, child, carrier, levels });
             }
         }
         groups
@@ -76,9 +82,9 @@ impl Group {
         self.check_materials(output, found);
     }
 
-    /// Child first, then the levels.
+    /// The nodes with meshes: level 0 first.
     pub(super) fn members(&self) -> impl Iterator<Item = usize> {
-        std::iter::once(self.child).chain(self.levels.iter().copied())
+        std::iter::once(self.carrier).chain(self.levels.iter().copied())
     }
 
     fn check_anchor(&self, source: &Document, output: &Document, found: &mut Found) {
@@ -103,6 +109,21 @@ impl Group {
             }
             found.require(index(node, "mesh").is_some(), Rule::Roles, &place, "a level without a mesh");
         }
+        if self.carrier == self.child {
+            return;
+        }
+        let (place, node) = (format!("nodes[{}]", self.child), &array(output, "nodes")[self.child]);
+        for key in TRANSFORM_KEYS.iter().filter(|&&key| key != "children") {
+            let text = format!("`{key}` belongs to the anchor");
+            found.require(node.get(key).is_none(), Rule::Transforms, &place, text);
+        }
+        for key in MESH_KEYS {
+            let text = format!("`{key}` belongs to the node below it");
+            found.require(node.get(key).is_none(), Rule::Follow, &place, text);
+        }
+        let below = &array(output, "nodes")[self.carrier];
+        let strays = below.get("extras").is_some() || extension(below, "MSFT_lod").is_some();
+        found.require(!strays, Rule::Roles, format_args!("nodes[{}]", self.carrier), "says something of levels itself");
     }
 
     fn check_coverage(&self, output: &Document, found: &mut Found) {
@@ -140,7 +161,7 @@ impl Group {
 
     fn check_followers(&self, output: &Document, found: &mut Found) {
         let nodes = array(output, "nodes");
-        let child = &nodes[self.child];
+        let child = &nodes[self.carrier];
         for &level in &self.levels {
             let (place, node) = (format!("nodes[{level}]"), &nodes[level]);
             let same_skin = node.get("skin") == child.get("skin");
@@ -169,7 +190,10 @@ impl Group {
                 found.require(drive.goes_with_mesh(), Rule::Transforms, drive.place(), text);
             }
         }
-        for drive in drives.of(self.child) {
+        for drive in drives.of(self.carrier) {
+            let found_by_engines = !drive.property.starts_with("weights") || self.carrier != self.child;
+            let text = "drives weights of a node with levels, which three.js does not find";
+            found.require(found_by_engines, Rule::Follow, drive.place(), text);
             for &level in &self.levels {
                 let wanted = !drive.property.starts_with("weights") || has_targets(output, &nodes[level]);
                 let twin = |other: &Drive<'_>| {
@@ -191,7 +215,7 @@ impl Group {
         };
         let look = |p: &Value| (p.get("material").cloned(), extension(p, "KHR_materials_variants").cloned());
         for &level in &self.levels {
-            let mut finest = primitives(self.child).into_iter();
+            let mut finest = primitives(self.carrier).into_iter();
             let all = primitives(level).into_iter().all(|p| finest.any(|f| look(f) == look(p)));
             let text = "a level's primitive has a material or variants that level 0 has not";
             found.require(all, Rule::Follow, format_args!("nodes[{level}].mesh"), text);

@@ -39,13 +39,13 @@ pub(super) fn check(source: &Document, output: &Document, groups: &[Group], foun
 /// Puts the mesh and what belongs to it back on the anchor.
 fn restore_anchor(root: &mut Value, source: &Document, group: &Group) {
     let before = &array(source, "nodes")[group.anchor];
-    let mut child = root["nodes"][group.child].clone();
+    let mut carrier = root["nodes"][group.carrier].clone();
     // A repeated mesh stands for the one it repeats.
-    if let (Some(mesh), Some(original)) = (index(&child, "mesh"), index(before, "mesh"))
+    if let (Some(mesh), Some(original)) = (index(&carrier, "mesh"), index(before, "mesh"))
         && mesh >= array(source, "meshes").len()
         && root["meshes"][mesh] == root["meshes"][original]
     {
-        child["mesh"] = json!(original);
+        carrier["mesh"] = json!(original);
     }
     let anchor = &mut root["nodes"][group.anchor];
     if let Some(children) = anchor["children"].as_array_mut() {
@@ -55,11 +55,11 @@ fn restore_anchor(root: &mut Value, source: &Document, group: &Group) {
         }
     }
     for key in ["mesh", "skin", "weights"] {
-        if let Some(value) = child.get(key) {
+        if let Some(value) = carrier.get(key) {
             anchor[key] = value.clone();
         }
     }
-    for (name, value) in child["extensions"].as_object().into_iter().flatten() {
+    for (name, value) in carrier["extensions"].as_object().into_iter().flatten() {
         if name != "MSFT_lod" {
             anchor["extensions"][name] = value.clone();
         }
@@ -68,7 +68,7 @@ fn restore_anchor(root: &mut Value, source: &Document, group: &Group) {
 
 /// Lets everything that points at a child point at its anchor again, and drops what was repeated for the levels.
 fn restore_references(root: &mut Value, source: &Value, groups: &[Group]) {
-    let anchors: BTreeMap<usize, usize> = groups.iter().map(|group| (group.child, group.anchor)).collect();
+    let anchors: BTreeMap<usize, usize> = groups.iter().map(|group| (group.carrier, group.anchor)).collect();
     let animations = source["animations"].as_array().map_or(0, Vec::len);
     for i in 0..animations {
         truncate(&mut root["animations"][i], &source["animations"][i], "channels");

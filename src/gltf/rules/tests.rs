@@ -27,7 +27,7 @@ fn source() -> Document {
     source
 }
 
-/// Nodes 0 and 1 are anchors, 2 and 5 their children, 3 and 4 and 6 and 7 the levels.
+/// Nodes 0 and 1 are anchors, 2 and 6 their children, 3 and 4 and 7 and 8 the levels; 5 shows level 0 below node 2.
 fn output() -> Document {
     let mut output = source();
     add_levels(&mut output, &[chain(0, &own(1), &shared())], &Batches::new(), &EmitSettings::default()).unwrap();
@@ -108,6 +108,20 @@ fn followers() {
     assert_eq!(lost_twin, [Rule::Follow]);
     assert!(broken(|root| root["animations"][0]["channels"][0]["target"]["node"] = json!(0)).contains(&Rule::Follow));
     assert_eq!(broken(|root| root["meshes"][1]["primitives"][0]["material"] = json!(5)), [Rule::Follow]);
+    // three.js finds no weights on a node with levels: the mesh may not move up from node 5 to node 2.
+    let one_up = broken(|root| {
+        for key in ["mesh", "skin", "weights"] {
+            let value = root["nodes"][5].as_object_mut().unwrap().shift_remove(key).unwrap();
+            root["nodes"][2][key] = value;
+        }
+        let instancing = root["nodes"][5]["extensions"]["EXT_mesh_gpu_instancing"].take();
+        root["nodes"][2]["extensions"]["EXT_mesh_gpu_instancing"] = instancing;
+        root["nodes"][2].as_object_mut().unwrap().shift_remove("children");
+        root["nodes"][5] = json!({});
+        root["animations"][0]["channels"][0]["target"]["node"] = json!(2);
+    });
+    assert!(one_up.contains(&Rule::Follow), "{one_up:?}");
+    assert!(broken(|root| root["nodes"][2]["weights"] = json!([0])).contains(&Rule::Follow));
     let variants = |root: &mut Value| root["meshes"][1]["primitives"][0]["extensions"] = json!({});
     assert_eq!(broken(variants), [Rule::Follow]);
 }
@@ -116,7 +130,7 @@ fn followers() {
 fn roles() {
     assert_eq!(broken(|root| root["scenes"][0]["nodes"] = json!([0, 3])), [Rule::NothingLost, Rule::Roles]);
     assert!(broken(|root| root["skins"][0]["joints"] = json!([1, 4])).contains(&Rule::Roles));
-    assert!(broken(|root| root["nodes"][5]["extensions"]["MSFT_lod"]["ids"] = json!([3, 7])).contains(&Rule::Roles));
+    assert!(broken(|root| root["nodes"][6]["extensions"]["MSFT_lod"]["ids"] = json!([3, 8])).contains(&Rule::Roles));
     assert!(broken(|root| root["nodes"][3]["mesh"] = json!(0)).contains(&Rule::Roles));
     assert!(broken(|root| root["nodes"][3]["mesh"] = json!(2)).contains(&Rule::Roles));
     assert_eq!(broken(|root| root["nodes"][3]["extras"] = json!({})), [Rule::Roles]);
@@ -160,7 +174,7 @@ fn layout() {
 fn own_anchors_and_instances() {
     let shared_anchor = broken(|root| {
         root["nodes"][1]["children"] = json!([]);
-        root["nodes"][0]["children"] = json!([1, 2, 5]);
+        root["nodes"][0]["children"] = json!([1, 2, 6]);
     });
     assert!(shared_anchor.contains(&Rule::OwnAnchor));
     let fewer = broken(|root| {
@@ -173,10 +187,10 @@ fn own_anchors_and_instances() {
 fn new_instances_need_all_three_attributes_and_a_declaration() {
     let instances = |root: &mut Value| {
         let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": 0 } } });
-        for node in 6..8 {
+        for node in 7..9 {
             root["nodes"][node]["extensions"] = instancing.clone();
         }
-        root["nodes"][5]["extensions"]["EXT_mesh_gpu_instancing"] = instancing["EXT_mesh_gpu_instancing"].clone();
+        root["nodes"][6]["extensions"]["EXT_mesh_gpu_instancing"] = instancing["EXT_mesh_gpu_instancing"].clone();
     };
     assert_eq!(broken(instances), [Rule::NothingLost, Rule::InstanceData, Rule::InstancingDeclared]);
 }
