@@ -15,6 +15,7 @@ pub mod mesh;
 pub mod metric;
 pub mod simplify;
 pub mod distance;
+pub mod compare;
 pub mod allocate;
 pub mod lod;
 pub mod config;

@@ -12,8 +12,7 @@ const KNOWN_TO_HOLD: [&str; 4] =
     ["KHR_materials_variants", "EXT_mesh_features", "EXT_structural_metadata", "KHR_xmp_json_ld"];
 
 /// They describe the source's own triangles, points or bytes; on a level they would be wrong.
-const BOUND_TO_SOURCE: [&str; 8] = [
-    "KHR_draco_mesh_compression",
+const BOUND_TO_SOURCE: [&str; 7] = [
     "EXT_mesh_polygon",
     "EXT_mesh_primitive_edge_visibility",
     "EXT_mesh_primitive_restart",
@@ -22,6 +21,9 @@ const BOUND_TO_SOURCE: [&str; 8] = [
     "KHR_gaussian_splatting",
     "PRIMITIVE_OUTLINE",
 ];
+
+/// How the source's bytes are packed, not what they mean: a level has its own bytes and loses nothing.
+const PACKING: &str = "KHR_draco_mesh_compression";
 
 /// What a level has in common with its source.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +42,7 @@ pub(super) fn extensions(
     notes: &mut Notes,
 ) -> Map<String, Value> {
     let mut carried = Map::new();
-    for (name, value) in source {
+    for (name, value) in source.iter().filter(|(name, _)| *name != PACKING) {
         let holds = KNOWN_TO_HOLD.contains(&name.as_str());
         if BOUND_TO_SOURCE.contains(&name.as_str()) {
             notes.add(place, format!("`{name}` belongs to the source's triangles and is not carried to levels"));
