@@ -31,5 +31,6 @@ pub mod progress;
 pub mod work;
 pub mod emit;
 pub mod report;
+pub mod study;
 pub mod command;
 pub mod cli;

@@ -65,7 +65,7 @@ impl TextureStretch {
             };
             let (by_s, by_t) = (along(1, 1.0), along(0, -1.0));
             let (a, b, c) = (dot(by_s, by_s), dot(by_s, by_t), dot(by_t, by_t));
-            squares += (a + c) / 2.0 * surface;
+            squares += f64::midpoint(a, c) * surface;
             max = max.max(((a + c + ((a - c) * (a - c) + 4.0 * b * b).sqrt()) / 2.0).sqrt());
             area += surface;
             texture += twice.abs() / 2.0;
