@@ -22,6 +22,7 @@ pub mod config;
 pub mod scan;
 pub mod gltf;
 pub mod obj;
+pub mod appearance;
 pub mod identify;
 pub mod key;
 pub mod index;

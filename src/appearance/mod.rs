@@ -1,0 +1,22 @@
+//! How things look: pictures of scenes and levels, and how far apart two of them are.
+//!
+//! `looks` holds materials and textures, `drawable` the triangles and where they stand, `assemble` makes both from a
+//! scene; `views` places cameras, `render` draws (`raster` finds what is seen, `shade` its colour), `metric` and `ssim`
+//! compare, `sheet` shows. Knows nothing of how levels are made, and is not told which of two drawables is the level.
+
+pub mod assemble;
+pub mod drawable;
+pub mod looks;
+pub mod material;
+pub mod metric;
+pub mod raster;
+pub mod render;
+pub mod shade;
+pub mod sheet;
+mod skin;
+pub mod srgb;
+pub mod ssim;
+#[cfg(test)]
+mod tests;
+pub mod texture;
+pub mod views;
