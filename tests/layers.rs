@@ -25,6 +25,7 @@ const CRATES: &[(&str, &[&str], &str)] = &[
     ("meshopt", &["gltf", "lod"], "the codec belongs to gltf, cache order to lod"),
     ("draco_core", &["gltf"], "only gltf decodes"),
     ("tobj", &["obj"], "only obj reads OBJ"),
+    ("basisu", &["appearance"], "only appearance looks into images"),
     ("image", &["appearance"], "only appearance looks into images"),
     ("anyhow", &["command", "cli"], "errors elsewhere carry typed facts"),
     ("indicatif", &["progress"], "only progress draws bars"),

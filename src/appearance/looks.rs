@@ -1,8 +1,8 @@
 //! All materials of a document with their textures, decoded once and shared by every level that is drawn.
 //!
-//! A texture that is missing or cannot be read is a note, never a failure: the factor beside it is used alone. PNG,
-//! JPEG and WebP are read.
+//! A texture that is missing or cannot be read is a note, never a failure: the factor beside it is used alone.
 
+use super::image_file::{Decoded, decode};
 use super::material::Material;
 use super::texture::{Encoding, Texture};
 use crate::gltf::buffers::Buffers;
@@ -14,14 +14,10 @@ use rayon::prelude::*;
 use serde_json::Value;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Cursor;
 use std::path::Path;
 
-/// Largest image that is decoded, in texels along a side: a file of some bytes may claim more than fits in memory.
-const LONGEST_IMAGE: u32 = 16384;
-
 /// Extensions that give a texture another image in a format of their own, in the order of preference.
-const OTHER_SOURCES: [&str; 1] = ["EXT_texture_webp"];
+const OTHER_SOURCES: [&str; 2] = ["EXT_texture_webp", "KHR_texture_basisu"];
 
 /// Materials and textures of one document.
 #[derive(Clone, Debug)]
@@ -166,35 +162,13 @@ fn image_bytes<'a>(
     std::fs::read(&path).map(Cow::Owned).map_err(|e| format!("cannot read `{}`: {e}", uri::shorten(address)))
 }
 
-/// An image as rows of texels from the top.
-struct Decoded {
-    width: u32,
-    height: u32,
-    texels: Vec<[u8; 4]>,
-}
-
-fn decode(bytes: &[u8]) -> Result<Decoded, String> {
-    let fail = |e: image::ImageError| format!("the image cannot be decoded: {e}");
-    let mut reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
-    if reader.format().is_none() {
-        return Err("the image is neither PNG nor JPEG nor WebP".to_owned());
-    }
-    let mut limits = image::Limits::default();
-    (limits.max_image_width, limits.max_image_height) = (Some(LONGEST_IMAGE), Some(LONGEST_IMAGE));
-    limits.max_alloc = Some(2 << 30);
-    reader.limits(limits);
-    let image = reader.decode().map_err(fail)?.into_rgba8();
-    let (width, height) = image.dimensions();
-    let texels = image.into_raw().chunks_exact(4).map(|t| [t[0], t[1], t[2], t[3]]).collect();
-    Ok(Decoded { width, height, texels })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::gltf::document::Container;
     use base64::Engine as _;
     use serde_json::json;
+    use std::io::Cursor;
 
     fn png() -> String {
         let mut bytes = Vec::new();
@@ -238,7 +212,7 @@ mod tests {
             notes,
             [
                 "images[0]: there is no file `nowhere.png`; materials are shown without it",
-                "images[1]: the image is neither PNG nor JPEG nor WebP; materials are shown without it",
+                "images[1]: the image is neither PNG, JPEG, WebP nor KTX2; materials are shown without it",
             ]
         );
         let material = &looks.materials[0];
@@ -248,9 +222,9 @@ mod tests {
 
     #[test]
     fn formats_of_extensions() {
-        let only = json!([{ "extensions": { "KHR_texture_basisu": { "source": 0 } } }, { "source": 7 }]);
+        let only = json!([{ "extensions": { "MSFT_texture_dds": { "source": 0 } } }, { "source": 7 }]);
         let notes = load(&json!([{ "uri": png() }]), &only).notes;
-        assert_eq!(notes[0].text, "the texture has only KHR_texture_basisu; materials are shown without it");
+        assert_eq!(notes[0].text, "the texture has only MSFT_texture_dds; materials are shown without it");
         assert_eq!(notes[1].text, "the texture has no image; materials are shown without it");
         assert_eq!(notes.len(), 2);
         let webp = json!([{ "source": 7, "extensions": { "EXT_texture_webp": { "source": 0 } } }, { "source": 0 }]);

@@ -1,11 +1,14 @@
 //! How things look: pictures of scenes and levels, and how far apart two of them are.
 //!
-//! `looks` holds materials and textures, `drawable` the triangles and where they stand, `assemble` makes both from a
-//! scene; `views` places cameras, `render` draws (`raster` finds what is seen, `shade` its colour), `metric` and `ssim`
-//! compare, `sheet` shows. Knows nothing of how levels are made, and is not told which of two drawables is the level.
+//! `looks` holds materials and textures (`image_file` reads their files), `drawable` the triangles and where they stand,
+//! `assemble` makes both from a scene; `views` places cameras, `render` draws (`raster` finds what is seen, `shade` its
+//! colour), `metric` and `ssim` compare, `blame` gives differences back to faces, `sheet` shows. Knows nothing of how
+//! levels are made, and is not told which of two drawables is the level.
 
 pub mod assemble;
+pub mod blame;
 pub mod drawable;
+pub mod image_file;
 pub mod looks;
 pub mod material;
 pub mod metric;

@@ -131,6 +131,30 @@ fn faces_are_numbered_through_parts_and_shared_by_instances() {
 }
 
 #[test]
+fn differences_go_to_the_faces_seen_there() {
+    let looks = looks(matte(), Vec::new());
+    let square = Arc::new(square());
+    let whole = Drawable::of_parts(vec![Arc::clone(&square)], Arc::clone(&looks));
+    let mut half = Part::clone(&square);
+    half.indices.truncate(3);
+    let half = Drawable::of_parts(vec![Arc::new(half)], looks);
+    let frame = Frame { center: DVec3::ZERO, radius: 1.5 };
+    let shot = Shot { size: 64, faces: true };
+    let reference = Reference::new(&Cpu, &whole, frame, &[DVec3::Z], shot).unwrap();
+    let blame = reference.blame(&Cpu, &half, 2).unwrap();
+    // The second face is missing: all of the difference is its.
+    let rms = reference.compare(&Cpu, &half, false).unwrap().rms;
+    assert_eq!((blame.squares[0], blame.nowhere), (0.0, 0.0));
+    assert!((blame.squares[1] / 4096.0 - rms * rms).abs() < 1e-3 * rms * rms);
+    assert_eq!(blame.pixels.iter().sum::<u32>() as usize, covered(&reference.pictures[0]));
+    // The other way round, the candidate's pixels lie within reach of the reference's face or nowhere.
+    let reference = Reference::new(&Cpu, &half, frame, &[DVec3::Z], shot).unwrap();
+    let blame = reference.blame(&Cpu, &whole, 1).unwrap();
+    let sum = (blame.squares[0] + blame.nowhere) / 4096.0;
+    assert!(blame.squares[0] > 0.0 && blame.nowhere > blame.squares[0] && (sum - rms * rms).abs() < 1e-3 * sum);
+}
+
+#[test]
 fn sizes_and_odd_input_are_answered() {
     let ball = one(sphere(4), looks(matte(), Vec::new()));
     let camera = Camera::new(ball.frame(), DVec3::Z);
