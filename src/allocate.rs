@@ -51,6 +51,20 @@ impl Allocation {
     }
 }
 
+impl Allocation {
+    /// Steps of all sequences.
+    pub fn steps(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Number of steps of each sequence among the cheapest `steps` of all.
+    pub fn cuts_after(&self, steps: usize) -> Vec<usize> {
+        let mut cuts = vec![0; self.sequences];
+        self.order[..steps.min(self.order.len())].iter().for_each(|&(sequence, _)| cuts[sequence as usize] += 1);
+        cuts
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::command::failure::{Failure, UsageError};
-use crate::command::{CacheChoice, Context, Exit, bake, cache, completions, explain, init, inspect, schema};
+use crate::command::{CacheChoice, Context, Exit, bake, cache, completions, evaluate, explain, init, inspect, schema};
 use crate::progress::{JsonLines, Lines, Paint, Reporter, Terminal, Verbosity};
 
 /// The pipeline that a bare `lodbake` bakes.
@@ -84,6 +84,8 @@ enum Command {
     Init(init::Init),
     /// Show what is in a scene, and what a bake would save
     Inspect(inspect::Inspect),
+    /// Measure how scenes or levels differ from a reference
+    Evaluate(evaluate::Evaluate),
     /// Tell why a scene would be baked again
     Explain(explain::Explain),
     /// Look after the cache
@@ -110,6 +112,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> Exit {
     let done = match &cli.command {
         Command::Bake(command) => command.run(&context),
         Command::Init(command) => command.run(&context),
+        Command::Evaluate(command) => command.run(&context),
         Command::Explain(command) => command.run(&context),
         Command::Cache(command) => command.run(&context),
         Command::Schema(command) => command.run(&context),

@@ -22,7 +22,14 @@ pub enum Target {
     ErrorOfRadius(f64),
     /// Largest distance from the source, object space units.
     Error(f64),
+    /// Largest distance from the source, as a fraction of the whole mesh's radius.
+    ErrorOfMesh(f64),
+    /// Image difference from the source as the [`Judge`] sees it.
+    Appearance(f64),
 }
+
+/// How much a level, one entry for each part (`None` = as the source), differs from the source to look at: d_RMS.
+pub type Judge<'a> = &'a (dyn Fn(&[Option<Level>]) -> f64 + Sync);
 
 /// Where the vertices of a level are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -65,6 +72,8 @@ pub enum Stop {
     Target,
     /// The error limit asked for.
     ErrorLimit,
+    /// The image difference asked for.
+    LookLimit,
     /// No pair was left that could be contracted.
     NoLegalPair,
 }
@@ -89,13 +98,16 @@ pub struct ChainLevel {
     pub error: f64,
     /// Why it stopped there.
     pub stop: Stop,
+    /// The recipe that made it, where several were tried.
+    pub recipe: Option<String>,
 }
 
-/// Cuts the chain.
-pub fn chain(parts: &[Part], settings: &ChainSettings) -> Chain {
+/// Cuts the chain. Levels by appearance need a judge; without one they are left out.
+pub fn chain(parts: &[Part], settings: &ChainSettings, judge: Option<Judge>) -> Chain {
     let sequences: Vec<&Progressive> = parts.iter().filter_map(|p| p.sequence).collect();
     let fixed: usize = parts.iter().filter(|p| p.sequence.is_none()).map(|p| p.mesh.triangles()).sum();
     let source: usize = parts.iter().map(|p| p.mesh.triangles()).sum();
+    let radius = crate::mesh::layout::frame(parts.iter().flat_map(|p| &p.mesh.primitives)).1;
     let allocation = Allocation::new(&sequences);
     let mut cutters: Vec<Cutter> = parts.iter().filter_map(|p| Some(Cutter::new(p, p.sequence?, settings))).collect();
     let mut chain = Chain { levels: Vec::new() };
@@ -108,7 +120,18 @@ pub fn chain(parts: &[Part], settings: &ChainSettings) -> Chain {
                 let left: usize = sequences.iter().zip(&cuts).map(|(s, &c)| s.triangles_after(c)).sum();
                 (cuts, if left + fixed <= wanted { Stop::Target } else { Stop::NoLegalPair })
             }
-            Target::Error(_) | Target::ErrorOfRadius(_) => {
+            Target::Appearance(limit) => {
+                let Some(judge) = judge else { continue };
+                let difference = |cuts: &[usize]| judge(&cut_all(parts, &mut cutters, cuts, Finish::Draft));
+                let cuts = cuts_by_looks(&allocation, limit, difference);
+                let all = sequences.iter().zip(&cuts).all(|(s, &c)| c == s.steps.len());
+                (cuts, if all { Stop::NoLegalPair } else { Stop::LookLimit })
+            }
+            Target::Error(_) | Target::ErrorOfRadius(_) | Target::ErrorOfMesh(_) => {
+                let target = match target {
+                    Target::ErrorOfMesh(fraction) => Target::Error(fraction * radius),
+                    other => other,
+                };
                 let cuts: Vec<usize> = cutters.iter().map(|cutter| cutter.cut_within(target)).collect();
                 let all = sequences.iter().zip(&cuts).all(|(s, &c)| c == s.steps.len());
                 (cuts, if all { Stop::NoLegalPair } else { Stop::ErrorLimit })
@@ -123,12 +146,48 @@ pub fn chain(parts: &[Part], settings: &ChainSettings) -> Chain {
             continue;
         }
         triangles_before = left + fixed;
-        let mut levels = cutters.iter_mut().zip(&cuts).map(|(cutter, &cut)| cutter.level(cut));
-        let level_parts: Vec<Option<Level>> = parts.iter().map(|p| p.sequence.and_then(|_| levels.next())).collect();
+        let level_parts = cut_all(parts, &mut cutters, &cuts, Finish::Whole);
         let error = level_parts.iter().flatten().map(|level| level.error).fold(0.0, f64::max);
-        chain.levels.push(ChainLevel { target: number, triangles: left + fixed, parts: level_parts, error, stop });
+        chain.levels.push(ChainLevel {
+            target: number,
+            triangles: left + fixed,
+            parts: level_parts,
+            error,
+            stop,
+            recipe: None,
+        });
     }
     chain
+}
+
+/// What a level is cut for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Finish {
+    /// To be looked at once: not measured, not put in order for a GPU.
+    Draft,
+    /// To be kept.
+    Whole,
+}
+
+/// One level of every part; `None` for those without a sequence.
+fn cut_all(parts: &[Part], cutters: &mut [Cutter], cuts: &[usize], finish: Finish) -> Vec<Option<Level>> {
+    let mut levels = cutters.iter_mut().zip(cuts).map(|(cutter, &cut)| cutter.level(cut, finish));
+    parts.iter().map(|p| p.sequence.and_then(|_| levels.next())).collect()
+}
+
+/// The cuts after which the next contraction, anywhere in the mesh, exceeds the limit. The difference grows with the
+/// contractions, though not strictly: the search by halves finds one such place.
+fn cuts_by_looks(allocation: &Allocation, limit: f64, mut difference: impl FnMut(&[usize]) -> f64) -> Vec<usize> {
+    let (mut within, mut over) = (0, allocation.steps() + 1);
+    while 1 < over - within {
+        let middle = within + (over - within) / 2;
+        if difference(&allocation.cuts_after(middle)) <= limit {
+            within = middle;
+        } else {
+            over = middle;
+        }
+    }
+    allocation.cuts_after(within)
 }
 
 /// Triangles asked for; at least one.
@@ -136,7 +195,7 @@ fn wanted(target: Target, source: usize) -> usize {
     match target {
         Target::Ratio(ratio) => ((source as f64 * ratio).round() as usize).max(1),
         Target::Triangles(triangles) => triangles,
-        Target::Error(_) | Target::ErrorOfRadius(_) => 0,
+        Target::Error(_) | Target::ErrorOfRadius(_) | Target::ErrorOfMesh(_) | Target::Appearance(_) => 0,
     }
 }
 
@@ -191,7 +250,7 @@ impl<'a> Cutter<'a> {
         let limit = match target {
             Target::ErrorOfRadius(fraction) => fraction * self.radius,
             Target::Error(limit) => limit,
-            Target::Ratio(_) | Target::Triangles(_) => return 0,
+            Target::Ratio(_) | Target::Triangles(_) | Target::ErrorOfMesh(_) | Target::Appearance(_) => return 0,
         };
         let (mut within, mut over) = (0, self.sequence.steps.len() + 1);
         // Below this many steps a finer answer is not worth another measurement.
@@ -212,7 +271,7 @@ impl<'a> Cutter<'a> {
         within.min(self.sequence.steps.len())
     }
 
-    fn level(&mut self, cut: usize) -> Level {
+    fn level(&mut self, cut: usize, finish: Finish) -> Level {
         if cut < self.done {
             // A later target asked for a finer cut of this part: start again.
             self.replay = Replay::new(self.part.mesh, self.sequence);
@@ -221,9 +280,12 @@ impl<'a> Cutter<'a> {
         self.replay.advance(cut);
         let cuts = self.replay.primitives();
         let sources = &self.part.mesh.primitives;
-        let error = measured(&self.source, self.part.mesh, &mut self.replay, &cuts);
-        let primitives =
-            cuts.into_iter().enumerate().map(|(index, cut)| self.primitive(index, &sources[index], cut)).collect();
+        let error = match finish {
+            Finish::Draft => 0.0,
+            Finish::Whole => measured(&self.source, self.part.mesh, &mut self.replay, &cuts),
+        };
+        let primitive = |(index, cut)| self.primitive(index, &sources[index], cut, finish);
+        let primitives = cuts.into_iter().enumerate().map(primitive).collect();
         Level { primitives, error }
     }
 
@@ -231,19 +293,20 @@ impl<'a> Cutter<'a> {
         measured(&self.source, self.part.mesh, replay, cuts)
     }
 
-    fn primitive(&self, index: usize, source: &Primitive, mut cut: CutPrimitive) -> LevelPrimitive {
+    fn primitive(&self, index: usize, source: &Primitive, mut cut: CutPrimitive, finish: Finish) -> LevelPrimitive {
         if cut.indices.is_empty() {
             return LevelPrimitive { indices: Vec::new(), vertices: LevelVertices::Source };
         }
         let count = cut.wedges.len();
-        if self.settings.vertex_cache {
+        let in_order = self.settings.vertex_cache && finish == Finish::Whole;
+        if in_order {
             cut.indices = meshopt::optimize_vertex_cache(&cut.indices, count);
         }
         if self.part.shareable && self.shares(source, &cut) {
             let indices = cut.indices.iter().map(|&i| self.replay.origin(cut.wedges[i as usize])).collect();
             return LevelPrimitive { indices, vertices: LevelVertices::Source };
         }
-        if self.settings.vertex_cache {
+        if in_order {
             order_by_use(&mut cut);
         }
         let vertices = self.replay.vertices(index, &cut);

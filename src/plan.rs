@@ -1,8 +1,8 @@
 //! Identified scenes + settings → what has to be there before they can be written: sequences of distinct sub-meshes,
-//! and chains cut from them. Looks nothing up and computes nothing.
+//! chains cut from them, and figures of how their levels look. Looks nothing up and computes nothing.
 //!
 //! A job is a pure function of bytes: its key holds the mesh hash, the settings that are used and the algorithm version,
-//! and no path, name or scene.
+//! and no path, name or scene. Where looks are concerned, it holds the content of materials and images.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 use crate::config::{self, ErrorUnit, LevelTarget, SceneSettings, SimplifySettings};
 use crate::gltf::scene::SourceMesh;
 use crate::identify::SubMesh;
-use crate::key::{JobKey, Manifest, ManifestWriter, MeshParts, SequenceJob, key_of, write_chain};
+use crate::key::{ContentHash, JobKey, Manifest, ManifestWriter, MeshParts, SequenceJob, key_of, write_chain};
 use crate::lod::{ChainSettings, Storage, Target};
 use crate::mesh::Mesh;
 use crate::mesh::hash::MeshHash;
@@ -37,6 +37,32 @@ pub struct ChainTask {
     pub parts: Vec<PartTask>,
     /// Targets and storage.
     pub settings: ChainSettings,
+    /// The recipes that `sequences` of the parts stand for; more than one where the best-looking is kept.
+    pub recipes: Vec<String>,
+    /// What its levels are judged by, where looks decide.
+    pub judged: Option<MeshLook>,
+}
+
+/// What a mesh looks like: by name and place, since textures are loaded only where pictures are drawn.
+#[derive(Clone, Debug)]
+pub struct MeshLook {
+    /// Number of the scene in its wave, whose materials are meant.
+    pub scene: usize,
+    /// Content of all materials and images of the mesh, primitive by primitive.
+    pub hash: ContentHash,
+    /// Material of each primitive of the mesh, as an index in `materials`.
+    pub materials: Arc<Vec<Option<usize>>>,
+    /// Pixels on each side of the pictures.
+    pub size: u32,
+}
+
+/// Figures of how the levels of a chain look.
+#[derive(Clone, Debug)]
+pub struct LookTask {
+    /// The chain.
+    pub chain: JobKey,
+    /// What its mesh looks like.
+    pub look: MeshLook,
 }
 
 /// One sub-mesh of a chain.
@@ -46,8 +72,10 @@ pub struct PartTask {
     pub hash: MeshHash,
     /// The sub-mesh.
     pub mesh: Arc<Mesh>,
-    /// Its sequence; `None` if it is left as it is.
-    pub sequence: Option<JobKey>,
+    /// The mesh's primitives that it is made of.
+    pub primitives: Vec<usize>,
+    /// Its sequences, one for each recipe; none if it is left as it is.
+    pub sequences: Vec<JobKey>,
     /// Levels may refer to the source's vertices.
     pub shareable: bool,
 }
@@ -61,54 +89,75 @@ pub struct Plan {
     pub sequences: BTreeMap<JobKey, SequenceTask>,
     /// Chains by key.
     pub chains: BTreeMap<JobKey, ChainTask>,
+    /// Figures of looks by key.
+    pub looks: BTreeMap<JobKey, LookTask>,
 }
 
 /// What is planned for one mesh of a scene.
 #[derive(Clone, Debug)]
 pub enum MeshPlan {
-    /// Its levels are in this chain; parts are the mesh's sub-meshes in order.
-    Chain(JobKey),
+    /// It has levels.
+    Chain {
+        /// The chain; its parts are the mesh's sub-meshes in order.
+        chain: JobKey,
+        /// Figures of how its levels look, where they are recorded.
+        look: Option<JobKey>,
+    },
     /// It has no levels, and why.
     Alone(&'static str),
 }
 
 impl Plan {
     /// Adds what one mesh needs. `is_sealed` = levels cannot refer to the source's vertices (they are compressed in a
-    /// way that only whole primitives can be decoded from).
+    /// way that only whole primitives can be decoded from). `look` = what the mesh looks like, where that is asked for.
     pub fn add(
         &mut self,
         source: &SourceMesh,
         sub_meshes: &[SubMesh],
         is_sealed: bool,
+        look: Option<&MeshLook>,
         settings: &SceneSettings,
     ) -> MeshPlan {
         if sub_meshes.is_empty() {
             return MeshPlan::Alone("it has no triangles");
         }
-        let recipe = recipe(settings);
-        let shareable = !is_sealed && recipe.placement == Placement::Subset;
+        let recipes = recipes(&settings.simplify);
+        let shareable = !is_sealed && placement(&settings.simplify) == Placement::Subset;
         let parts: Vec<PartTask> = sub_meshes
             .iter()
             .map(|sub| {
                 let mesh = self.meshes.entry(sub.hash).or_insert_with(|| Arc::new(sub.mesh(source))).clone();
                 let enough = settings.min_triangles <= mesh.triangles();
-                let sequence = enough.then(|| self.sequence(sub.hash, &mesh, settings, recipe));
-                PartTask { hash: sub.hash, mesh, sequence, shareable }
+                let sequence = |recipe| self.sequence(sub.hash, &mesh, recipe);
+                let sequences = if enough { recipes.iter().map(sequence).collect() } else { Vec::new() };
+                PartTask { hash: sub.hash, mesh, primitives: sub.primitives.clone(), sequences, shareable }
             })
             .collect();
-        if parts.iter().all(|part| part.sequence.is_none()) {
+        if parts.iter().all(|part| part.sequences.is_empty()) {
             return MeshPlan::Alone("every part of it has fewer triangles than `min_triangles`");
         }
-        let key = key_of(&ChainManifest { parts: &parts, chain: &settings.chain });
-        let chain = || ChainTask { parts, settings: chain_settings(&settings.chain) };
+        let judged = look.filter(|_| settings.looks_decide()).cloned();
+        let key = key_of(&ChainManifest { parts: &parts, chain: &settings.chain, judged: judged.as_ref() });
+        let chain = || ChainTask {
+            parts,
+            settings: chain_settings(&settings.chain),
+            recipes: recipes.iter().map(recipe_name).collect(),
+            judged,
+        };
         self.chains.entry(key).or_insert_with(chain);
-        MeshPlan::Chain(key)
+        let look = look.filter(|_| settings.appearance.record).map(|look| {
+            let task = LookTask { chain: key, look: look.clone() };
+            let key = key_of(&LookManifest(&task));
+            self.looks.entry(key).or_insert(task);
+            key
+        });
+        MeshPlan::Chain { chain: key, look }
     }
 
-    fn sequence(&mut self, hash: MeshHash, mesh: &Arc<Mesh>, settings: &SceneSettings, recipe: Settings) -> JobKey {
-        let job = SequenceJob { mesh: hash, parts: MeshParts::of(mesh), simplify: &settings.simplify };
+    fn sequence(&mut self, hash: MeshHash, mesh: &Arc<Mesh>, recipe: &SimplifySettings) -> JobKey {
+        let job = SequenceJob { mesh: hash, parts: MeshParts::of(mesh), simplify: recipe };
         let key = key_of(&job);
-        let task = || SequenceTask { hash, mesh: mesh.clone(), settings: recipe };
+        let task = || SequenceTask { hash, mesh: mesh.clone(), settings: simplify_settings(recipe) };
         self.sequences.entry(key).or_insert_with(task);
         key
     }
@@ -118,6 +167,7 @@ impl Plan {
 struct ChainManifest<'a> {
     parts: &'a [PartTask],
     chain: &'a config::ChainSettings,
+    judged: Option<&'a MeshLook>,
 }
 
 impl Manifest for ChainManifest<'_> {
@@ -126,28 +176,86 @@ impl Manifest for ChainManifest<'_> {
         to.integer("algorithm_version", crate::key::ALGORITHM_VERSION.into());
         for (index, part) in self.parts.iter().enumerate() {
             to.open(&format!("part[{index}]"));
-            match &part.sequence {
-                Some(key) => to.hash("sequence", &key.0),
-                None => to.hash("as_source", &part.hash.0),
+            if part.sequences.is_empty() {
+                to.hash("as_source", &part.hash.0);
+            }
+            for key in &part.sequences {
+                to.hash("sequence", &key.0);
             }
             to.flag("shareable", part.shareable);
             to.close();
         }
         write_chain(self.chain, to);
+        if let Some(look) = self.judged {
+            write_look(look, to);
+        }
     }
 }
 
-fn recipe(settings: &SceneSettings) -> Settings {
-    let SimplifySettings { metric, effort, weights, placement, lock_border } = &settings.simplify;
+/// What figures of looks depend on: the chain, and what its mesh looks like.
+struct LookManifest<'a>(&'a LookTask);
+
+impl Manifest for LookManifest<'_> {
+    fn write(&self, to: &mut dyn ManifestWriter) {
+        to.integer("format_version", crate::key::FORMAT_VERSION.into());
+        to.hash("chain", &self.0.chain.0);
+        write_look(&self.0.look, to);
+    }
+}
+
+fn write_look(look: &MeshLook, to: &mut dyn ManifestWriter) {
+    to.integer("look_version", crate::key::LOOK_VERSION.into());
+    to.hash("look", &look.hash.0);
+    to.integer("look_size", look.size.into());
+}
+
+/// Factors of the weights of normals and texture coordinates, the most useful first: which weights suit a mesh depends on
+/// how clean its normals are and how busy its textures.
+const FACTORS: [(f64, f64); 7] =
+    [(1.0, 1.0), (6.0, 1.0), (20.0, 1.0), (1.0, 3.0), (1.0 / 6.0, 1.0), (6.0, 3.0), (1.0, 1.0 / 6.0)];
+
+/// The recipes to try: one, but for metric `auto`. Each is a set of settings that users could write themselves, so that
+/// it shares its results with them.
+fn recipes(settings: &SimplifySettings) -> Vec<SimplifySettings> {
+    if settings.metric != config::Metric::Auto {
+        return vec![settings.clone()];
+    }
+    let its = FACTORS.iter().map(|&(normal, texcoord)| {
+        let mut recipe = SimplifySettings { metric: config::Metric::Its, ..settings.clone() };
+        recipe.weights.normal *= normal;
+        recipe.weights.texcoord *= texcoord;
+        recipe
+    });
+    let qem = SimplifySettings { metric: config::Metric::Qem, ..settings.clone() };
+    its.chain(std::iter::once(qem)).take(settings.candidates as usize).collect()
+}
+
+/// `its normal 0.018 texcoord 0.3`: what a report calls the winner.
+fn recipe_name(recipe: &SimplifySettings) -> String {
+    if recipe.metric == config::Metric::Qem {
+        return "qem".to_owned();
+    }
+    // The weights of the portfolio are products: six digits tell them apart and leave out the noise.
+    let digits = |weight: f64| format!("{weight:.6}").trim_end_matches('0').trim_end_matches('.').to_owned();
+    format!("its normal {} texcoord {}", digits(recipe.weights.normal), digits(recipe.weights.texcoord))
+}
+
+fn placement(settings: &SimplifySettings) -> Placement {
+    match settings.placement {
+        config::Placement::Auto | config::Placement::Optimal => Placement::Optimal,
+        config::Placement::Subset => Placement::Subset,
+    }
+}
+
+fn simplify_settings(settings: &SimplifySettings) -> Settings {
+    let SimplifySettings { metric, effort, weights, placement: _, lock_border, candidates: _ } = settings;
     Settings {
         metric: match metric {
-            config::Metric::Its => MetricKind::Its,
+            // `recipes` has put others in the place of `auto`.
+            config::Metric::Its | config::Metric::Auto => MetricKind::Its,
             config::Metric::Qem => MetricKind::Qem,
         },
-        placement: match placement {
-            config::Placement::Auto | config::Placement::Optimal => Placement::Optimal,
-            config::Placement::Subset => Placement::Subset,
-        },
+        placement: placement(settings),
         attributes: AttributeScale { normal: weights.normal, texcoord: weights.texcoord, color: weights.color },
         edges: EdgeWeights { border: weights.border, seam: weights.seam, crease: weights.crease },
         lock_border: *lock_border,
@@ -161,6 +269,9 @@ fn chain_settings(chain: &config::ChainSettings) -> ChainSettings {
         LevelTarget::Triangles(triangles) => Target::Triangles(triangles as usize),
         LevelTarget::Error { limit, unit: ErrorUnit::Radius } => Target::ErrorOfRadius(limit),
         LevelTarget::Error { limit, unit: ErrorUnit::Object } => Target::Error(limit),
+        // The sphere's diameter is `size` pixels high.
+        LevelTarget::Pixels { limit, size } => Target::ErrorOfMesh(2.0 * limit / size),
+        LevelTarget::Appearance(limit) => Target::Appearance(limit),
     };
     ChainSettings {
         targets: chain.levels.iter().map(target).collect(),

@@ -142,7 +142,7 @@ fn write(path: &Path, corpus: &Path, output: &Path, manner: Manner) -> Option<Wr
         Content::AsSource { copied: scene.dependencies.clone() }
     } else {
         let stem = target.file_stem().unwrap().to_str().unwrap().to_owned();
-        Content::Files(package.finish(&stem, added.buffer.clone()).unwrap())
+        Content::Files(package.finish(&stem, added.buffer.clone(), &scene.buffers).unwrap())
     };
     let emission = Emission { source: path, target: &target, content: &content };
     let emitted = OutputFolder::new(output).emit(&emission).unwrap();

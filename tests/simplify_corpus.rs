@@ -74,8 +74,11 @@ fn check(place: &str, mesh: &Mesh, settings: &Settings) {
     let shareable = settings.placement == Placement::Subset;
     let part = Part { mesh, sequence: Some(&sequence), shareable };
     let targets = vec![Target::Ratio(0.5), Target::Ratio(0.1), Target::Triangles(12)];
-    let chain =
-        chain(&[part], &ChainSettings { targets: targets.clone(), storage: Storage::Smallest, vertex_cache: true });
+    let chain = chain(
+        &[part],
+        &ChainSettings { targets: targets.clone(), storage: Storage::Smallest, vertex_cache: true },
+        None,
+    );
     let mut finer = mesh.triangles();
     for level in &chain.levels {
         let part = level.parts[0].as_ref().expect("the part has a sequence");

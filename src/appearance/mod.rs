@@ -8,6 +8,7 @@
 pub mod assemble;
 pub mod blame;
 pub mod drawable;
+pub mod fingerprint;
 pub mod image_file;
 pub mod looks;
 pub mod material;
@@ -17,6 +18,7 @@ pub mod render;
 pub mod shade;
 pub mod sheet;
 mod skin;
+pub mod soup;
 pub mod srgb;
 pub mod ssim;
 #[cfg(test)]

@@ -31,7 +31,9 @@ pub use upkeep::{BucketStats, Removed, Stats, Upkeep, UpkeepError, Verified};
 /// ├─ sequences-v1/
 /// │  └─ ab/              first two digits of the key
 /// │     └─ cdef….bin     the other 62
-/// └─ chains-v1/
+/// ├─ chains-v2/
+/// │  └─ ab/cdef….bin
+/// └─ looks-v1/
 ///    └─ ab/cdef….bin
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -40,17 +42,20 @@ pub enum Bucket {
     Sequences,
     /// Levels of meshes.
     Chains,
+    /// Figures of how levels look.
+    Looks,
 }
 
 impl Bucket {
     /// Every bucket.
-    pub const ALL: [Self; 2] = [Self::Sequences, Self::Chains];
+    pub const ALL: [Self; 3] = [Self::Sequences, Self::Chains, Self::Looks];
 
     /// Folder in the cache.
     pub fn folder(self) -> &'static str {
         match self {
             Self::Sequences => "sequences-v1",
-            Self::Chains => "chains-v1",
+            Self::Chains => "chains-v2",
+            Self::Looks => "looks-v1",
         }
     }
 }

@@ -66,7 +66,7 @@ fn what_is_put_is_found() {
     let expected = [
         ".gitignore".to_owned(),
         "CACHEDIR.TAG".to_owned(),
-        format!("chains-v1/01/{}.bin", rest("01")),
+        format!("chains-v2/01/{}.bin", rest("01")),
         "lock".to_owned(),
         format!("sequences-v1/01/{}.bin", rest("01")),
         format!("sequences-v1/02/{}.bin", rest("02")),
@@ -105,7 +105,7 @@ fn damaged_entries_are_misses_with_a_warning() {
     }
     let Lookup::Damaged(warning) = cache.get(Bucket::Chains, &key(1)) else { panic!("still damaged") };
     let told = warning.to_string().replace(&cache.folder().display().to_string(), "[CACHE]");
-    insta::assert_snapshot!(told.replace('\\', "/"), @"cache entry `[CACHE]/chains-v1/01/01010101010101010101010101010101010101010101010101010101010101.bin` is damaged: its hash is wrong; it is computed again");
+    insta::assert_snapshot!(told.replace('\\', "/"), @"cache entry `[CACHE]/chains-v2/01/01010101010101010101010101010101010101010101010101010101010101.bin` is damaged: its hash is wrong; it is computed again");
     cache.put(Bucket::Chains, &key(1), b"some bytes").unwrap();
     assert_eq!(hit(&cache, Bucket::Chains, &key(1)).unwrap(), b"some bytes", "a put mends it");
 }
@@ -249,7 +249,7 @@ fn upkeep_touches_only_what_the_cache_made() {
     }
     let stats = Stats::of(folder.path()).unwrap();
     let told: Vec<_> = stats.buckets.iter().map(|b| (b.name.as_str(), b.entries, b.bytes)).collect();
-    assert_eq!(told, [("chains-v0", 1, 5), ("chains-v1", 2, 208), ("index-v1", 1, 5), ("sequences-v1", 2, 208)]);
+    assert_eq!(told, [("chains-v0", 1, 5), ("chains-v2", 2, 208), ("index-v1", 1, 5), ("sequences-v1", 2, 208)]);
     assert_eq!(stats.bytes(), 426);
     Upkeep::begin(folder.path()).unwrap().collect(Some(0), None, now).unwrap();
     assert!(at("index-v1/a.bin").exists() && !at("chains-v0/old.bin").exists());

@@ -3,6 +3,7 @@
 
 use crate::config::ConfigError;
 use crate::emit::EmitError;
+use crate::evaluation::SubjectError;
 use crate::gltf::error::{DocumentError, ReadError};
 use crate::progress::Paint;
 use crate::report::ReportError;
@@ -72,6 +73,8 @@ fn hint(error: &anyhow::Error) -> Option<String> {
         } else if let Some(error) = cause.downcast_ref::<ReadError>() {
             owned(error.hint())
         } else if let Some(error) = cause.downcast_ref::<DocumentError>() {
+            owned(error.hint())
+        } else if let Some(error) = cause.downcast_ref::<SubjectError>() {
             owned(error.hint())
         } else if let Some(error) = cause.downcast_ref::<EmitError>() {
             owned(error.hint())

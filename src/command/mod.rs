@@ -6,6 +6,7 @@
 pub mod bake;
 pub mod cache;
 pub mod completions;
+pub mod evaluate;
 pub mod explain;
 pub mod failure;
 pub mod init;

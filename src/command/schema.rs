@@ -1,7 +1,7 @@
 //! `lodbake schema KIND`: the JSON schema of a file that lodbake reads or writes, for editors and other programs.
 
 use super::{Context, Exit};
-use crate::{config, progress, report};
+use crate::{config, evaluation, progress, report};
 
 /// Write the JSON schema of a file format
 #[derive(Clone, Debug, clap::Args)]
@@ -22,6 +22,8 @@ enum Kind {
     Events,
     /// `lodbake inspect --json FILE`
     Inspection,
+    /// `lodbake evaluate --json REFERENCE CANDIDATE`
+    Evaluation,
 }
 
 impl Schema {
@@ -31,6 +33,7 @@ impl Schema {
             Kind::Pipeline => config::schema(),
             Kind::Report => report::schema(),
             Kind::Events => progress::schema(),
+            Kind::Evaluation => evaluation::schema(),
             Kind::Inspection => report::inspection::schema(),
         };
         context.print(&format!("{schema:#}\n"))?;

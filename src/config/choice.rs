@@ -38,6 +38,8 @@ choice! {
         Its = "its",
         /// Quadric error of positions alone (Garland and Heckbert 1997); fastest, blind to textures.
         Qem = "qem",
+        /// Several recipes are tried for each mesh, and each level is taken from the one that looks best.
+        Auto = "auto",
     }
 }
 

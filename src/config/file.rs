@@ -89,6 +89,9 @@ pub(super) struct PipelineFile {
     /// How meshes are simplified.
     pub simplify: Option<SimplifyTable>,
 
+    /// How looks are measured.
+    pub appearance: Option<AppearanceTable>,
+
     /// The levels, finest first. Default: ratios 0.5, 0.25 and 0.1.
     #[schemars(length(min = 1, max = 32))]
     pub lod: Option<Vec<LodEntry>>,
@@ -122,6 +125,10 @@ pub(super) struct SimplifyTable {
     /// What the contraction of an edge costs. Default: its.
     #[schemars(extend("default" = Metric::default()))]
     pub metric: Option<Metric>,
+
+    /// Number of recipes that metric `auto` tries for each mesh: more take longer and look better. Default: 3.
+    #[schemars(range(min = 1, max = 8), extend("default" = defaults::CANDIDATES))]
+    pub candidates: Option<u32>,
 
     /// How much work is spent on each mesh. Default: balanced.
     #[schemars(extend("default" = Effort::default()))]
@@ -164,10 +171,23 @@ pub(super) struct SimplifyTable {
     pub lock_border: Option<bool>,
 }
 
-/// One level: exactly one of `ratio`, `triangles` and `error` says how coarse it is.
+/// How looks are measured when scenes are baked: 24 views of each mesh and level, compared with the source.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{ "required": ["ratio"] }, { "required": ["triangles"] }, { "required": ["error"] }]))]
+pub(super) struct AppearanceTable {
+    /// Measure the looks of every level and record them in the report. Default: true.
+    #[schemars(extend("default" = true))]
+    pub record: Option<bool>,
+
+    /// Pixels on each side of the pictures. Default: 256.
+    #[schemars(range(min = 32, max = 2048), extend("default" = defaults::LOOK_SIZE))]
+    pub size: Option<u32>,
+}
+
+/// One level: exactly one of `ratio`, `triangles`, `error`, `pixels` and `appearance` says how coarse it is.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["ratio"] }, { "required": ["triangles"] }, { "required": ["error"] }, { "required": ["pixels"] }, { "required": ["appearance"] }]))]
 pub(super) struct LodEntry {
     /// Share of each mesh's triangles that is left; between 0 and 1, exclusive.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
@@ -184,6 +204,19 @@ pub(super) struct LodEntry {
     /// Unit of `error`. Default: radius, a fraction of the bounding radius.
     #[schemars(extend("default" = ErrorUnit::default()))]
     pub unit: Option<ErrorUnit>,
+
+    /// Largest distance between the surfaces as seen on a screen, in pixels, where the mesh is `size` pixels high; more
+    /// than 0.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub pixels: Option<f64>,
+
+    /// Height of the mesh's bounding sphere on the screen that `pixels` means, in pixels; more than 0.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub size: Option<f64>,
+
+    /// Largest image difference from the source (d_RMS, luminance 0 to 255 over 24 views); more than 0.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub appearance: Option<f64>,
 
     /// Share of the viewport's height taken by the bounding sphere below which this level is shown; more than 0, at
     /// most 1. Give it for all levels or for none. Default: computed from the level's error and `[screen]`.
@@ -220,6 +253,9 @@ pub(super) struct OverrideEntry {
 
     /// As `[simplify]`; keys that are not given keep their value.
     pub simplify: Option<SimplifyTable>,
+
+    /// As `[appearance]`; keys that are not given keep their value.
+    pub appearance: Option<AppearanceTable>,
 
     /// As `[[lod]]`; replaces the whole list.
     #[schemars(length(min = 1, max = 32))]

@@ -21,7 +21,9 @@ pub use choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Storage}
 pub use error::{ConfigError, Names, Place};
 pub use file::schema;
 pub use globs::Globs;
-pub use settings::{ChainSettings, EmitSettings, LevelTarget, SceneSettings, Screen, SimplifySettings, Weights};
+pub use settings::{
+    AppearanceSettings, ChainSettings, EmitSettings, LevelTarget, SceneSettings, Screen, SimplifySettings, Weights,
+};
 
 /// A folder: as the user wrote it, for messages, and where it is.
 #[derive(Clone, Debug, PartialEq, Eq)]

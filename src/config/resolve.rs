@@ -6,9 +6,11 @@ use std::path::{Component, Path, PathBuf};
 use super::check::Document;
 use super::choice::{ErrorUnit, Placement, Storage};
 use super::error::{ConfigError, Place};
-use super::file::{LodEntry, OneOrMany, OverrideEntry, PipelineFile, ScreenTable, SimplifyTable};
+use super::file::{AppearanceTable, LodEntry, OneOrMany, OverrideEntry, PipelineFile, ScreenTable, SimplifyTable};
 use super::globs::Globs;
-use super::settings::{ChainSettings, EmitSettings, LevelTarget, SceneSettings, Screen, SimplifySettings, Weights};
+use super::settings::{
+    AppearanceSettings, ChainSettings, EmitSettings, LevelTarget, SceneSettings, Screen, SimplifySettings, Weights,
+};
 use super::{Folder, Pipeline, defaults};
 
 /// The settings that an override may change; an absent key leaves what is below it.
@@ -21,6 +23,7 @@ pub(super) struct Layer {
     vertex_cache: Option<bool>,
     screen: ScreenTable,
     simplify: SimplifyTable,
+    appearance: AppearanceTable,
     lod: Option<Vec<LodEntry>>,
 }
 
@@ -35,7 +38,8 @@ impl Layer {
         lay!(over, self; skip, format, storage, profile, vertex_cache, lod);
         lay!(over.screen, self.screen; pixels, height, fov);
         lay!(over.simplify, self.simplify; metric, effort, normal, texcoord, color, border, seam, crease);
-        lay!(over.simplify, self.simplify; placement, min_triangles, lock_border);
+        lay!(over.simplify, self.simplify; placement, min_triangles, lock_border, candidates);
+        lay!(over.appearance, self.appearance; record, size);
     }
 
     /// Fills what is still absent with defaults.
@@ -62,6 +66,10 @@ impl Layer {
                 },
                 coverage,
             },
+            appearance: AppearanceSettings {
+                record: self.appearance.record.unwrap_or(true),
+                size: self.appearance.size.unwrap_or(defaults::LOOK_SIZE),
+            },
         }
     }
 
@@ -83,6 +91,7 @@ impl Layer {
                 _ => table.placement.unwrap_or_default(),
             },
             lock_border: table.lock_border.unwrap_or(false),
+            candidates: table.candidates.unwrap_or(defaults::CANDIDATES),
         }
     }
 }
@@ -105,6 +114,7 @@ pub(super) fn pipeline(document: &Document<'_>, file: &str) -> Result<Pipeline, 
         vertex_cache: typed.vertex_cache,
         screen: typed.screen.unwrap_or_default(),
         simplify: typed.simplify.unwrap_or_default(),
+        appearance: typed.appearance.unwrap_or_default(),
         lod: typed.lod,
     };
     check_layer(document, &top, &layer)?;
@@ -137,6 +147,7 @@ fn override_layer(document: &Document<'_>, place: &Place, entry: OverrideEntry) 
         vertex_cache: entry.vertex_cache,
         screen: entry.screen.unwrap_or_default(),
         simplify: entry.simplify.unwrap_or_default(),
+        appearance: entry.appearance.unwrap_or_default(),
         lod: entry.lod,
     };
     check_layer(document, place, &layer)?;
@@ -162,10 +173,15 @@ fn check_layer(document: &Document<'_>, place: &Place, layer: &Layer) -> Result<
     for (i, entry) in entries.iter().enumerate() {
         let place = place.index(i);
         if target(entry).is_none() {
-            return Err(document.invalid(&place, "must have exactly one of `ratio`, `triangles` and `error`"));
+            let text = "must have exactly one of `ratio`, `triangles`, `error`, `pixels` and `appearance`";
+            return Err(document.invalid(&place, text));
         }
         if entry.unit.is_some() && entry.error.is_none() {
             return Err(document.invalid(&place.key("unit"), "is the unit of `error`, which this level does not have"));
+        }
+        if entry.size.is_some() != entry.pixels.is_some() {
+            let text = "needs `pixels` and `size` together: the error in pixels of a mesh that is `size` pixels high";
+            return Err(document.invalid(&place, text));
         }
         if let Some(cause) = entries[..i].iter().rev().find_map(|finer| not_coarser(finer, entry)) {
             return Err(document.invalid(&place, cause));
@@ -179,14 +195,19 @@ fn check_layer(document: &Document<'_>, place: &Place, layer: &Layer) -> Result<
     Ok(())
 }
 
-/// Exactly one of the three, or `None`.
+/// Exactly one of the five, or `None`.
 fn target(entry: &LodEntry) -> Option<LevelTarget> {
-    match (entry.ratio, entry.triangles, entry.error) {
-        (Some(ratio), None, None) => Some(LevelTarget::Ratio(ratio)),
-        (None, Some(triangles), None) => Some(LevelTarget::Triangles(triangles)),
-        (None, None, Some(limit)) => Some(LevelTarget::Error { limit, unit: entry.unit.unwrap_or_default() }),
-        _ => None,
-    }
+    let unit = entry.unit.unwrap_or_default();
+    let given = [
+        entry.ratio.map(LevelTarget::Ratio),
+        entry.triangles.map(LevelTarget::Triangles),
+        entry.error.map(|limit| LevelTarget::Error { limit, unit }),
+        // Without `size`, which is checked apart, any height will do.
+        entry.pixels.map(|limit| LevelTarget::Pixels { limit, size: entry.size.unwrap_or(1.0) }),
+        entry.appearance.map(LevelTarget::Appearance),
+    ];
+    let mut given = given.into_iter().flatten();
+    given.next().filter(|_| given.next().is_none())
 }
 
 /// Why `entry` is not coarser than the `finer` level before it, where that can be told.
@@ -212,6 +233,15 @@ fn not_coarser(finer: &LodEntry, entry: &LodEntry) -> Option<String> {
             let unit = if unit == ErrorUnit::Object { " object units" } else { "" };
             Some(format!("has error {now} after {before}{unit}: levels go from fine to coarse, error must grow"))
         }
+        (LevelTarget::Pixels { limit: before, size: old }, LevelTarget::Pixels { limit: now, size })
+            if now / size <= before / old =>
+        {
+            let words = "levels go from fine to coarse, pixels must grow or size must become smaller";
+            Some(format!("has {now} pixels at {size} after {before} at {old}: {words}"))
+        }
+        (LevelTarget::Appearance(before), LevelTarget::Appearance(now)) if now <= before => Some(format!(
+            "has appearance {now} after {before}: levels go from fine to coarse, the difference must grow"
+        )),
         _ => None,
     }
 }

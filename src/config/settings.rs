@@ -21,10 +21,27 @@ pub struct SceneSettings {
     pub chain: ChainSettings,
     /// What decides how levels are written into a scene.
     pub emit: EmitSettings,
+    /// How looks are measured.
+    pub appearance: AppearanceSettings,
+}
+
+/// How looks are measured at bake time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct AppearanceSettings {
+    /// The looks of every level are measured and recorded.
+    pub record: bool,
+    /// Pixels on each side of the pictures.
+    pub size: u32,
+}
+
+impl Default for AppearanceSettings {
+    fn default() -> Self {
+        Self { record: true, size: defaults::LOOK_SIZE }
+    }
 }
 
 /// What decides the contraction sequence of a sub-mesh.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SimplifySettings {
     /// What the contraction of an edge costs.
     pub metric: Metric,
@@ -36,6 +53,21 @@ pub struct SimplifySettings {
     pub placement: Placement,
     /// Vertices of open borders stay where they are.
     pub lock_border: bool,
+    /// Recipes that metric `auto` tries, 1 or more.
+    pub candidates: u32,
+}
+
+impl Default for SimplifySettings {
+    fn default() -> Self {
+        Self {
+            metric: Metric::default(),
+            effort: Effort::default(),
+            weights: Weights::default(),
+            placement: Placement::default(),
+            lock_border: false,
+            candidates: defaults::CANDIDATES,
+        }
+    }
 }
 
 /// Weights of the parts of the error, each 0 or more; 0 leaves the part out.
@@ -94,6 +126,29 @@ pub enum LevelTarget {
         /// What `limit` is measured in.
         unit: ErrorUnit,
     },
+    /// Largest distance between the surfaces as it is seen on a screen.
+    Pixels {
+        /// The distance on the screen, in pixels; more than 0.
+        limit: f64,
+        /// Height of the mesh's bounding sphere on that screen, in pixels; more than 0.
+        size: f64,
+    },
+    /// Image difference from the source, d_RMS: root mean square of luminance (0…255) over 24 views.
+    Appearance(f64),
+}
+
+impl LevelTarget {
+    /// Whether pictures have to be drawn to find the level.
+    pub fn is_looked_at(&self) -> bool {
+        matches!(self, Self::Appearance(_))
+    }
+}
+
+impl SceneSettings {
+    /// Whether looks decide any byte of the outputs.
+    pub fn looks_decide(&self) -> bool {
+        self.simplify.metric == Metric::Auto || self.chain.levels.iter().any(LevelTarget::is_looked_at)
+    }
 }
 
 /// What decides how levels are written into a scene, given their bytes.

@@ -51,23 +51,23 @@ fn paths_are_relative_to_the_file() {
 
 #[test]
 fn unknown_keys_name_the_nearest() {
-    insta::assert_snapshot!(refused("sotrage = 'shared'"), @"unknown key `sotrage` in `project/pipeline.toml` line 3 (did you mean `storage`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `lod`, `override`)");
+    insta::assert_snapshot!(refused("sotrage = 'shared'"), @"unknown key `sotrage` in `project/pipeline.toml` line 3 (did you mean `storage`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `lod`, `override`)");
     insta::assert_snapshot!(refused("[screen]\npixel = 2"), @"unknown key `screen.pixel` in `project/pipeline.toml` line 4 (did you mean `pixels`? known: `pixels`, `height`, `fov`)");
-    insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\n[[lod]]\ntriangle = 5"), @"unknown key `lod[1].triangle` in `project/pipeline.toml` line 6 (did you mean `triangles`? known: `ratio`, `triangles`, `error`, `unit`, `coverage`)");
+    insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\n[[lod]]\ntriangle = 5"), @"unknown key `lod[1].triangle` in `project/pipeline.toml` line 6 (did you mean `triangles`? known: `ratio`, `triangles`, `error`, `unit`, `pixels`, `size`, `appearance`, `coverage`)");
     insta::assert_snapshot!(refused("normal = 0.1"), @r"
-    unknown key `normal` in `project/pipeline.toml` line 3 (did you mean `format`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `lod`, `override`)
+    unknown key `normal` in `project/pipeline.toml` line 3 (did you mean `format`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `lod`, `override`)
     hint: `normal` is a key of `[simplify]`
     ");
     insta::assert_snapshot!(refused("[simplify]\nseam = 1\njobs = 2"), @r"
-    unknown key `simplify.jobs` in `project/pipeline.toml` line 5 (known: `metric`, `effort`, `normal`, `texcoord`, `color`, `border`, `seam`, `crease`, `placement`, `min_triangles`, `lock_border`)
+    unknown key `simplify.jobs` in `project/pipeline.toml` line 5 (known: `metric`, `candidates`, `effort`, `normal`, `texcoord`, `color`, `border`, `seam`, `crease`, `placement`, `min_triangles`, `lock_border`)
     hint: `jobs` stands at the top of the file, before the first `[table]`
     ");
-    insta::assert_snapshot!(refused("[[override]]\nmatch = 'a'\nsimplify.normals = 1"), @"unknown key `override[0].simplify.normals` in `project/pipeline.toml` line 5 (did you mean `normal`? known: `metric`, `effort`, `normal`, `texcoord`, `color`, `border`, `seam`, `crease`, `placement`, `min_triangles`, `lock_border`)");
+    insta::assert_snapshot!(refused("[[override]]\nmatch = 'a'\nsimplify.normals = 1"), @"unknown key `override[0].simplify.normals` in `project/pipeline.toml` line 5 (did you mean `normal`? known: `metric`, `candidates`, `effort`, `normal`, `texcoord`, `color`, `border`, `seam`, `crease`, `placement`, `min_triangles`, `lock_border`)");
 }
 
 #[test]
 fn unknown_names_list_the_known() {
-    insta::assert_snapshot!(refused("\n[simplify]\nmetric = 'qme'"), @"unknown simplify.metric `qme` in `project/pipeline.toml` line 5 (did you mean `qem`? known: `its`, `qem`)");
+    insta::assert_snapshot!(refused("\n[simplify]\nmetric = 'qme'"), @"unknown simplify.metric `qme` in `project/pipeline.toml` line 5 (did you mean `qem`? known: `its`, `qem`, `auto`)");
     insta::assert_snapshot!(refused("profile = 'blender'"), @"unknown profile `blender` in `project/pipeline.toml` line 3 (known: `web`, `core`, `unity`, `unreal`, `godot`, `babylon-stream`)");
     insta::assert_snapshot!(refused("[[override]]\nmatch = 'a'\nstorage = 'Shared'"), @"unknown override[0].storage `Shared` in `project/pipeline.toml` line 5 (did you mean `shared`? known: `smallest`, `compact`, `shared`)");
 }
@@ -114,12 +114,15 @@ fn absent_and_broken() {
 
 #[test]
 fn rules_between_keys() {
-    insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\nerror = 0.1"), @"`project/pipeline.toml` line 3: lod[0] must have exactly one of `ratio`, `triangles` and `error`");
-    insta::assert_snapshot!(refused("[[lod]]\ncoverage = 0.5"), @"`project/pipeline.toml` line 3: lod[0] must have exactly one of `ratio`, `triangles` and `error`");
+    insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\nerror = 0.1"), @"`project/pipeline.toml` line 3: lod[0] must have exactly one of `ratio`, `triangles`, `error`, `pixels` and `appearance`");
+    insta::assert_snapshot!(refused("[[lod]]\ncoverage = 0.5"), @"`project/pipeline.toml` line 3: lod[0] must have exactly one of `ratio`, `triangles`, `error`, `pixels` and `appearance`");
     insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\nunit = 'object'"), @"`project/pipeline.toml` line 5: lod[0].unit is the unit of `error`, which this level does not have");
     insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\n\n[[lod]]\nratio = 0.5"), @"`project/pipeline.toml` line 6: lod[1] has ratio 0.5 after 0.5: levels go from fine to coarse, ratio must become smaller");
     insta::assert_snapshot!(refused("lod = [{triangles = 9}, {error = 1}, {triangles = 10}]"), @"`project/pipeline.toml` line 3: lod[2] has triangles 10 after 9: levels go from fine to coarse, triangles must become smaller");
     insta::assert_snapshot!(refused("lod = [{error = 0.1}, {error = 0.01}]"), @"`project/pipeline.toml` line 3: lod[1] has error 0.01 after 0.1: levels go from fine to coarse, error must grow");
+    insta::assert_snapshot!(refused("lod = [{appearance = 2}, {appearance = 1}]"), @"`project/pipeline.toml` line 3: lod[1] has appearance 1 after 2: levels go from fine to coarse, the difference must grow");
+    insta::assert_snapshot!(refused("lod = [{pixels = 1, size = 200}, {pixels = 1, size = 300}]"), @"`project/pipeline.toml` line 3: lod[1] has 1 pixels at 300 after 1 at 200: levels go from fine to coarse, pixels must grow or size must become smaller");
+    insta::assert_snapshot!(refused("lod = [{pixels = 1}]"), @"`project/pipeline.toml` line 3: lod[0] needs `pixels` and `size` together: the error in pixels of a mesh that is `size` pixels high");
     insta::assert_snapshot!(refused("lod = [{ratio = 0.5, coverage = 0.5}, {ratio = 0.1}]"), @"`project/pipeline.toml` line 3: lod has `coverage` for 1 of 2 levels: give it for all or for none");
     insta::assert_snapshot!(refused("lod = [{ratio = 0.5, coverage = 0.5}, {ratio = 0.1, coverage = 0.6}]"), @"`project/pipeline.toml` line 3: lod[1] has coverage 0.6 after 0.5: levels go from fine to coarse, coverage must become smaller");
     insta::assert_snapshot!(refused("storage = 'shared'\nsimplify.placement = 'optimal'"), @"`project/pipeline.toml` line 4: simplify.placement `optimal` moves vertices, so the levels cannot use storage `shared`");

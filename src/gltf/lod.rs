@@ -18,6 +18,7 @@ use super::carry;
 use super::coverage::{Extent, Thresholds};
 use super::document::Document;
 use super::follow::{self, LevelNode, Moved};
+use super::host;
 use super::instancing::{self, Batches};
 use super::json;
 use super::level_mesh::{LevelMesh, LevelWriter, Role};
@@ -76,7 +77,7 @@ pub struct Added {
     pub levels: Vec<AddedLevel>,
     /// Nodes that now have levels.
     pub groups: usize,
-    /// Content of a buffer that was created; it needs an address before the document is complete.
+    /// Content of a buffer that was created or lengthened; it needs an address before the document is complete.
     pub buffer: Option<NewBuffer>,
     /// What was left out or done differently.
     pub notes: Vec<Note>,
@@ -134,6 +135,9 @@ pub fn add_levels(
     if chains.is_empty() {
         added.notes = writer.notes.into_vec();
         return Ok(added);
+    }
+    if let Some(buffer) = host::find(writer.document, &anchors.nodes.iter().map(|&(node, _)| node).collect())? {
+        writer.streams.append_to(writer.document, buffer)?;
     }
     let written = write_chains(&mut writer, &chains, &mut added.levels)?;
     let LevelWriter { document, streams, mut notes, .. } = writer;

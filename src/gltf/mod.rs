@@ -16,6 +16,7 @@ pub mod error;
 #[cfg(test)]
 mod fixture;
 mod follow;
+mod host;
 pub mod instancing;
 pub mod json;
 mod level_mesh;

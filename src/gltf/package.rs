@@ -161,7 +161,7 @@ impl Package {
         self.document.indented = true;
         let stands_for_bin = self.document.array("buffers")?.first().is_some_and(|first| first.get("uri").is_none());
         if let (Some(_), Some(bytes), true) = (self.document.bin.take(), buffers.bytes(0), stands_for_bin) {
-            self.written.push(NewBuffer { index: 0, bytes: bytes.to_vec() });
+            self.written.push(NewBuffer { index: 0, behind: 0, bytes: bytes.to_vec() });
         }
         if !std::mem::take(&mut self.document.extra_chunks).is_empty() {
             self.notes.add("chunks", "chunks of types nobody knows have no place in a `.gltf` and are left out");
@@ -179,8 +179,10 @@ impl Package {
         self.dependencies = dependencies.into_iter().filter(|d| addresses.contains(&d.uri)).collect();
     }
 
-    /// The files, for a main file called `stem` plus the container's extension. `added` is what `add_levels` created.
-    pub fn finish(mut self, stem: &str, added: Option<NewBuffer>) -> Result<Files, WriteError> {
+    /// The files, for a main file called `stem` plus the container's extension. `added` is what `add_levels` created;
+    /// `buffers` are the source document's.
+    pub fn finish(mut self, stem: &str, added: Option<NewBuffer>, buffers: &Buffers) -> Result<Files, WriteError> {
+        let added = added.map(|buffer| self.join(buffer, buffers));
         let mut taken: BTreeSet<String> =
             self.dependencies.iter().filter_map(|d| Some(d.path.file_name()?.to_str()?.to_lowercase())).collect();
         let mut beside = Vec::new();
@@ -188,10 +190,11 @@ impl Package {
             beside.push(self.address(buffer, stem, "bin", &mut taken)?);
         }
         if let Some(buffer) = added {
-            if self.keeps_buffers_inside(buffer.index)? {
+            if self.keeps_buffers_inside()? {
                 self.document.array_mut("buffers")?[buffer.index]["uri"] = json!(data_uri(&buffer.bytes));
             } else {
                 beside.push(self.address(buffer, stem, "lod.bin", &mut taken)?);
+                self.forget_unused();
             }
         }
         let main = match self.document.container {
@@ -201,10 +204,23 @@ impl Package {
         Ok(Files { main, beside, copied: self.dependencies })
     }
 
+    /// A lengthened buffer with the source's bytes before the new ones.
+    fn join(&mut self, buffer: NewBuffer, buffers: &Buffers) -> NewBuffer {
+        if buffer.behind == 0 {
+            return buffer;
+        }
+        // A buffer of this package that waits to be written (the BIN chunk of a GLB) becomes part of the other.
+        self.written.retain(|written| written.index != buffer.index);
+        let mut bytes = buffers.bytes(buffer.index).unwrap_or_default().to_vec();
+        bytes.resize(buffer.behind, 0);
+        bytes.extend_from_slice(&buffer.bytes);
+        NewBuffer { behind: 0, bytes, ..buffer }
+    }
+
     /// A `.gltf` with all buffers in data URIs is meant to be one file.
-    fn keeps_buffers_inside(&self, new: usize) -> Result<bool, WriteError> {
-        let others = self.document.array("buffers")?.iter().enumerate().filter(|&(i, _)| i != new);
-        let addresses: Vec<&str> = others.filter_map(|(_, buffer)| buffer.get("uri")?.as_str()).collect();
+    fn keeps_buffers_inside(&self) -> Result<bool, WriteError> {
+        let buffers = self.document.array("buffers")?.iter();
+        let addresses: Vec<&str> = buffers.filter_map(|buffer| buffer.get("uri")?.as_str()).collect();
         let inside = addresses.iter().all(|address| uri::form(address) == uri::Form::Data);
         Ok(self.document.container == Container::Gltf && inside && !addresses.is_empty())
     }

@@ -104,13 +104,15 @@ impl WriteError {
     }
 }
 
-/// A buffer that `add_levels` created because the document has no BIN chunk to append to. It has no `uri` yet:
-/// [`super::package`] gives it one.
+/// A buffer that `add_levels` created or lengthened because the document has no BIN chunk to append to.
+/// [`super::package`] gives it an address.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NewBuffer {
     /// Index in `buffers`.
     pub index: usize,
-    /// Its content.
+    /// The content begins with this many bytes of the source's buffer with the same index, zeros where it is shorter.
+    pub behind: usize,
+    /// The content, from there on.
     pub bytes: Vec<u8>,
 }
 
@@ -135,6 +137,8 @@ pub(super) struct Streams {
     buffer: Option<usize>,
     /// The bytes go to the BIN chunk, behind this offset.
     bin_end: Option<usize>,
+    /// They go behind this offset of a buffer of the source that is no BIN chunk.
+    host_end: usize,
     data: Vec<u8>,
     section: BTreeMap<Kind, Pending>,
 }
@@ -142,7 +146,7 @@ pub(super) struct Streams {
 impl Streams {
     /// Bytes go to the BIN chunk of a GLB where buffer 0 stands for it or can be made to; otherwise to a new buffer.
     pub(super) fn open(document: &Document) -> Result<Self, WriteError> {
-        let mut streams = Self { buffer: None, bin_end: None, data: Vec::new(), section: BTreeMap::new() };
+        let mut streams = Self { buffer: None, bin_end: None, host_end: 0, data: Vec::new(), section: BTreeMap::new() };
         if document.container != super::document::Container::Glb {
             return Ok(streams);
         }
@@ -162,6 +166,14 @@ impl Streams {
             Some(_) => {}
         }
         Ok(streams)
+    }
+
+    /// From now on bytes go behind those of `buffer`. Before anything is appended.
+    pub(super) fn append_to(&mut self, document: &Document, buffer: usize) -> Result<(), WriteError> {
+        let length = json::uint(&document.array("buffers")?[buffer], "byteLength", format_args!("buffers[{buffer}]"))?;
+        self.buffer = Some(buffer);
+        self.host_end = (length.unwrap_or(0) as usize).next_multiple_of(4);
+        Ok(())
     }
 
     /// Appends a triangle list over `vertices` vertices; answers its accessor.
@@ -227,7 +239,7 @@ impl Streams {
                 Some(buffer) => buffer,
                 None => *self.buffer.insert(document.push("buffers", json!({ "byteLength": 0 }))?),
             };
-            let offset = self.bin_end.unwrap_or(0) + self.data.len();
+            let offset = self.bin_end.unwrap_or(self.host_end) + self.data.len();
             let mut view = Map::new();
             view.insert("buffer".to_owned(), json!(buffer));
             view.insert("byteOffset".to_owned(), json!(offset));
@@ -253,10 +265,10 @@ impl Streams {
     /// Hands the bytes over: to the BIN chunk, or as a new buffer.
     pub(super) fn close(self, document: &mut Document) -> Result<Option<NewBuffer>, WriteError> {
         let Some(buffer) = self.buffer.filter(|_| !self.data.is_empty()) else { return Ok(None) };
-        let length = self.bin_end.unwrap_or(0) + self.data.len();
+        let length = self.bin_end.unwrap_or(self.host_end) + self.data.len();
         document.array_mut("buffers")?[buffer]["byteLength"] = json!(length);
         let Some(end) = self.bin_end else {
-            return Ok(Some(NewBuffer { index: buffer, bytes: self.data }));
+            return Ok(Some(NewBuffer { index: buffer, behind: self.host_end, bytes: self.data }));
         };
         let mut bin = Vec::with_capacity(length);
         bin.extend_from_slice(document.bin.as_deref().unwrap_or_default());

@@ -57,7 +57,7 @@ impl Manifest for SequenceJob<'_> {
 impl Manifest for SceneSettings {
     fn write(&self, to: &mut dyn ManifestWriter) {
         // `skip` decides whether there is an output at all.
-        let Self { skip: _, min_triangles, simplify, chain, emit } = self;
+        let Self { skip: _, min_triangles, simplify, chain, emit, appearance } = self;
         to.integer("format_version", FORMAT_VERSION.into());
         to.integer("algorithm_version", ALGORITHM_VERSION.into());
         to.integer("emit_version", EMIT_VERSION.into());
@@ -67,16 +67,21 @@ impl Manifest for SceneSettings {
         });
         write_chain(chain, to);
         write_emit(emit, to);
+        // Decides facts of the report, and levels where looks do.
+        to.flag("record_looks", appearance.record);
+        if appearance.record || self.looks_decide() {
+            to.integer("look_size", appearance.size.into());
+        }
     }
 }
 
 fn write_simplify(settings: &SimplifySettings, parts: MeshParts, to: &mut dyn ManifestWriter) {
-    let SimplifySettings { metric, effort, weights, placement, lock_border } = settings;
+    let SimplifySettings { metric, effort, weights, placement, lock_border, candidates } = settings;
     let Weights { normal, texcoord, color, border, seam, crease } = *weights;
     to.text("metric", metric.name());
     to.text("effort", effort.name());
     match metric {
-        Metric::Its => {
+        Metric::Its | Metric::Auto => {
             let attributes = [
                 ("normal", normal, parts.normals),
                 ("texcoord", texcoord, parts.texcoords),
@@ -91,6 +96,9 @@ fn write_simplify(settings: &SimplifySettings, parts: MeshParts, to: &mut dyn Ma
         }
         // Sees positions alone.
         Metric::Qem => to.number("border", border),
+    }
+    if *metric == Metric::Auto {
+        to.integer("candidates", (*candidates).into());
     }
     to.text("placement", placement.name());
     to.flag("lock_border", *lock_border);
@@ -109,6 +117,11 @@ pub fn write_chain(settings: &ChainSettings, to: &mut dyn ManifestWriter) {
                 to.number("error", limit);
                 to.text("unit", unit.name());
             }
+            LevelTarget::Pixels { limit, size } => {
+                to.number("pixels", limit);
+                to.number("size", size);
+            }
+            LevelTarget::Appearance(limit) => to.number("appearance", limit),
         });
     }
 }

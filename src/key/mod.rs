@@ -21,8 +21,11 @@ pub const FORMAT_VERSION: u32 = 1;
 /// Simplification and levels. Raise it in the commit that changes any bytes for the same mesh and settings.
 pub const ALGORITHM_VERSION: u32 = 1;
 
+/// How looks are measured. Raise it in the commit that changes any figure for the same pictures' subject.
+pub const LOOK_VERSION: u32 = 1;
+
 /// Form of the outputs. Raise it in the commit that writes the same levels in another way.
-pub const EMIT_VERSION: u32 = 2;
+pub const EMIT_VERSION: u32 = 3;
 
 /// Declares a 32-byte name, shown as 64 hexadecimal digits.
 macro_rules! digest {

@@ -13,8 +13,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use json::{FILE_NAME, ReportError, Written, read, schema, to_json, write};
-pub use table::{columns, summary_table};
+pub use table::{columns, percent, summary_table};
 
+use crate::compare::SurfaceDistance;
 use crate::config::{LevelTarget, SceneSettings};
 use crate::mesh::hash::MeshHash;
 
@@ -185,6 +186,22 @@ pub struct LevelRecord {
     pub distance: f64,
     /// Why it is not coarser.
     pub stop: Stop,
+    /// The recipe that made it, where several were tried.
+    #[serde(default)]
+    pub recipe: Option<String>,
+    /// Image difference from the source: root mean square of luminance differences (0 to 255) over 24 views of the mesh
+    /// alone. Absent where looks are not recorded.
+    #[serde(default)]
+    pub d_rms: Option<f64>,
+    /// The same of the view that differs most.
+    #[serde(default)]
+    pub worst_view: Option<f64>,
+    /// Share of the pixels covered by level or source that only one of them covers, 0 to 1.
+    #[serde(default)]
+    pub silhouette: Option<f64>,
+    /// Sampled distances between source and level, in units of the mesh's own space.
+    #[serde(default)]
+    pub surface: Option<SurfaceDistance>,
 }
 
 /// Why a level has the triangles it has.
@@ -195,6 +212,8 @@ pub enum Stop {
     Target,
     /// The error limit asked for.
     ErrorLimit,
+    /// The image difference asked for.
+    LookLimit,
     /// No edge was left that may be contracted.
     NoLegalPair,
 }
@@ -204,6 +223,7 @@ impl From<crate::lod::Stop> for Stop {
         match stop {
             crate::lod::Stop::Target => Self::Target,
             crate::lod::Stop::ErrorLimit => Self::ErrorLimit,
+            crate::lod::Stop::LookLimit => Self::LookLimit,
             crate::lod::Stop::NoLegalPair => Self::NoLegalPair,
         }
     }

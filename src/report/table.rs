@@ -121,6 +121,8 @@ pub fn target(target: &LevelTarget) -> String {
         LevelTarget::Triangles(triangles) => format!("{} triangles", count(triangles.into())),
         LevelTarget::Error { limit, unit: ErrorUnit::Radius } => format!("error {}", percent(limit)),
         LevelTarget::Error { limit, unit: ErrorUnit::Object } => format!("error {limit}"),
+        LevelTarget::Pixels { limit, size } => format!("{limit} px at {size}"),
+        LevelTarget::Appearance(limit) => format!("d_RMS {limit}"),
     }
 }
 
@@ -141,7 +143,7 @@ fn worst_error(report: &Report, number: u64) -> f64 {
 
 /// How many levels have more triangles than asked for. An error limit is no such promise: `None` for those.
 fn missed(report: &Report) -> Option<String> {
-    let counted = |level: &&LevelRecord| !matches!(level.target, LevelTarget::Error { .. });
+    let counted = |level: &&LevelRecord| matches!(level.target, LevelTarget::Ratio(_) | LevelTarget::Triangles(_));
     let levels = || meshes(report).flat_map(|mesh| &mesh.levels).filter(counted);
     let missed = levels().filter(|level| level.stop != Stop::Target).count() as u64;
     let all = plural(levels().count() as u64, "level");

@@ -21,6 +21,11 @@ fn level(number: u64, triangles: u64, stop: Stop) -> LevelRecord {
         coverage: 0.5,
         distance: 12.5,
         stop,
+        recipe: None,
+        d_rms: Some(1.5),
+        worst_view: Some(2.5),
+        silhouette: Some(0.01),
+        surface: None,
     }
 }
 

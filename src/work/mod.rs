@@ -1,7 +1,10 @@
 //! Plan → baked chains: look up, run the rest, store. Knows no scene, no path and no thread's number.
 //!
 //! Sequences and chains are separate results: another ratio cuts the same sequence anew. A sequence is only looked up
-//! where a chain is missing.
+//! where a chain is missing. Pictures are drawn where they decide a level or are recorded, scene by scene, so that the
+//! textures of one scene at a time are in memory.
+
+mod look;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -10,19 +13,31 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use crate::appearance::looks::Looks;
 use crate::cache::{Bucket, Cache, Lookup};
 use crate::key::JobKey;
-use crate::lod::{Chain, Part, chain};
-use crate::plan::{ChainTask, Plan, SequenceTask};
+use crate::lod::{Chain, ChainLevel, Part, chain};
+use crate::plan::{ChainTask, LookTask, MeshLook, Plan, SequenceTask};
 use crate::progress::{Event, Reporter};
 use crate::simplify::progressive::Progressive;
 use crate::simplify::simplify;
+
+pub use look::LevelLook;
+
+use look::Judge;
+
+/// Materials and textures of a scene of the plan, by its number.
+pub type LoadLooks<'a> = &'a (dyn Fn(usize) -> Arc<Looks> + Sync);
 
 /// What came of a plan.
 #[derive(Debug, Default)]
 pub struct Baked {
     /// All chains of the plan.
     pub chains: BTreeMap<JobKey, Arc<Chain>>,
+    /// How the levels of a chain look, in their order.
+    pub looks: BTreeMap<JobKey, Arc<Vec<LevelLook>>>,
+    /// Chains whose levels were drawn to be recorded.
+    pub drawn: usize,
     /// Sub-meshes that were simplified.
     pub jobs: usize,
     /// Sub-meshes whose results came from the cache.
@@ -31,8 +46,8 @@ pub struct Baked {
     pub warnings: Vec<String>,
 }
 
-/// Makes every chain of `plan`.
-pub fn work(plan: &Plan, cache: &Cache, reporter: &dyn Reporter) -> Baked {
+/// Makes every chain of `plan` and the figures of their looks.
+pub fn work(plan: &Plan, cache: &Cache, load: LoadLooks, reporter: &dyn Reporter) -> Baked {
     let mut out = Baked::default();
     let found: Vec<(JobKey, Found<Chain>)> =
         plan.chains.par_iter().map(|(&key, _)| (key, look_up(cache, Bucket::Chains, key))).collect();
@@ -45,26 +60,118 @@ pub fn work(plan: &Plan, cache: &Cache, reporter: &dyn Reporter) -> Baked {
         }
     }
     let sequences = sequences(plan, &missing, cache, reporter, &mut out);
-    let made: Vec<(JobKey, Arc<Chain>, Option<String>)> = missing
-        .par_iter()
-        .map(|(key, task)| {
-            let chain = cut(task, &sequences);
-            let warning = store(cache, Bucket::Chains, *key, &chain);
-            (*key, Arc::new(chain), warning)
-        })
-        .collect();
+    let make = |key: JobKey, task: &ChainTask, looks: Option<&Arc<Looks>>| {
+        let chain = cut(task, &sequences, looks);
+        let warning = store(cache, Bucket::Chains, key, &chain);
+        (key, Arc::new(chain), warning)
+    };
+    let (judged, plain): (Vec<_>, Vec<_>) = missing.into_iter().partition(|(_, task)| task.judged.is_some());
+    let mut made: Vec<(JobKey, Arc<Chain>, Option<String>)> =
+        plain.par_iter().map(|&(key, task)| make(key, task, None)).collect();
+    let scene = |task: &ChainTask| task.judged.as_ref().map_or(0, |look: &MeshLook| look.scene);
+    for group in by_scene(judged, |(_, task)| scene(task)) {
+        let looks = load(scene(group[0].1));
+        made.extend(group.par_iter().map(|&(key, task)| make(key, task, Some(&looks))).collect::<Vec<_>>());
+    }
     for (key, chain, warning) in made {
         out.warnings.extend(warning);
         out.chains.insert(key, chain);
     }
+    record_looks(plan, cache, load, &mut out);
     out
 }
 
-fn cut(task: &ChainTask, sequences: &BTreeMap<JobKey, Progressive>) -> Chain {
-    let part = |part: &crate::plan::PartTask| part.sequence.map(|key| &sequences[&key]);
-    let parts: Vec<Part> =
-        task.parts.iter().map(|p| Part { mesh: &p.mesh, sequence: part(p), shareable: p.shareable }).collect();
-    chain(&parts, &task.settings)
+/// Groups of one scene each, in the order of their scenes.
+fn by_scene<T>(mut tasks: Vec<T>, scene: impl Fn(&T) -> usize) -> Vec<Vec<T>> {
+    tasks.sort_by_key(&scene);
+    let mut groups: Vec<Vec<T>> = Vec::new();
+    for task in tasks {
+        match groups.last_mut() {
+            Some(group) if scene(&group[0]) == scene(&task) => group.push(task),
+            _ => groups.push(vec![task]),
+        }
+    }
+    groups
+}
+
+/// Cuts a chain; of several recipes, each level is taken from the one that looks best.
+fn cut(task: &ChainTask, sequences: &BTreeMap<JobKey, Progressive>, looks: Option<&Arc<Looks>>) -> Chain {
+    let judge = task.judged.as_ref().zip(looks).map(|(look, looks)| Judge::new(&task.parts, look, looks));
+    let difference =
+        |levels: &[Option<crate::mesh::Level>]| judge.as_ref().map_or(0.0, |judge| judge.difference(levels));
+    let candidates: Vec<Chain> = (0..task.recipes.len())
+        .map(|recipe| {
+            let sequence = |part: &crate::plan::PartTask| part.sequences.get(recipe).map(|key| &sequences[key]);
+            let parts: Vec<Part> = (task.parts.iter())
+                .map(|p| Part { mesh: &p.mesh, sequence: sequence(p), shareable: p.shareable })
+                .collect();
+            let mut chain = chain(&parts, &task.settings, judge.is_some().then_some(&difference));
+            if 1 < task.recipes.len() {
+                chain.levels.iter_mut().for_each(|level| level.recipe = Some(task.recipes[recipe].clone()));
+            }
+            chain
+        })
+        .collect();
+    best_of(candidates, |level| difference(&level.parts))
+}
+
+/// For each target the level that differs least; where looks were the target, the one with the fewest triangles. The
+/// first of equals. Levels that are no coarser than the one before them are left out.
+fn best_of(mut candidates: Vec<Chain>, difference: impl Fn(&ChainLevel) -> f64) -> Chain {
+    if candidates.len() < 2 {
+        return candidates.pop().unwrap_or(Chain { levels: Vec::new() });
+    }
+    let mut by_target: BTreeMap<usize, Vec<ChainLevel>> = BTreeMap::new();
+    for level in candidates.into_iter().flat_map(|chain| chain.levels) {
+        by_target.entry(level.target).or_default().push(level);
+    }
+    let mut chain = Chain { levels: Vec::new() };
+    let mut before = usize::MAX;
+    for levels in by_target.into_values() {
+        let rank = |level: &ChainLevel| match level.stop {
+            crate::lod::Stop::LookLimit => level.triangles as f64,
+            _ => difference(level),
+        };
+        let ranked = levels.into_iter().map(|level| (rank(&level), level));
+        let best = ranked.reduce(|best, next| if next.0 < best.0 { next } else { best });
+        if let Some((_, level)) = best.filter(|(_, level)| level.triangles < before) {
+            before = level.triangles;
+            chain.levels.push(level);
+        }
+    }
+    chain
+}
+
+/// Figures of all chains whose looks are recorded: from the cache, or from pictures.
+fn record_looks(plan: &Plan, cache: &Cache, load: LoadLooks, out: &mut Baked) {
+    let found: Vec<(JobKey, &LookTask, Found<Vec<LevelLook>>)> =
+        plan.looks.par_iter().map(|(&key, task)| (key, task, look_up(cache, Bucket::Looks, key))).collect();
+    let mut missing = Vec::new();
+    for (key, task, found) in found {
+        out.warnings.extend(found.warning);
+        match found.value {
+            Some(figures) => drop(out.looks.insert(key, Arc::new(figures))),
+            None => missing.push((key, task)),
+        }
+    }
+    out.drawn = missing.len();
+    for group in by_scene(missing, |(_, task)| task.look.scene) {
+        let looks = load(group[0].1.look.scene);
+        let chains = &out.chains;
+        let made: Vec<(JobKey, Vec<LevelLook>, Option<String>)> = group
+            .par_iter()
+            .map(|&(key, task)| {
+                let judge = Judge::new(&plan.chains[&task.chain].parts, &task.look, &looks);
+                let figures = chains[&task.chain].levels.iter().map(|level| judge.figures(&level.parts)).collect();
+                let warning = store(cache, Bucket::Looks, key, &figures);
+                (key, figures, warning)
+            })
+            .collect();
+        for (key, figures, warning) in made {
+            out.warnings.extend(warning);
+            out.looks.insert(key, Arc::new(figures));
+        }
+    }
 }
 
 /// The sequences that the missing chains are cut from. Sub-meshes of chains that were found count as hits.
@@ -76,7 +183,7 @@ fn sequences(
     out: &mut Baked,
 ) -> BTreeMap<JobKey, Progressive> {
     let wanted: BTreeSet<JobKey> =
-        missing.iter().flat_map(|(_, task)| task.parts.iter().filter_map(|p| p.sequence)).collect();
+        missing.iter().flat_map(|(_, task)| task.parts.iter().flat_map(|p| p.sequences.iter().copied())).collect();
     for (key, task) in &plan.sequences {
         if !wanted.contains(key) {
             out.hits += 1;

@@ -1,18 +1,15 @@
 //! What a report says of one scene, made where the scene is baked and remembered by the index.
 
-use std::collections::BTreeMap;
-use std::sync::Arc;
-
 use serde::{Deserialize, Serialize};
 
 use super::wave::ReadScene;
 use crate::gltf::scene::SourceMesh;
-use crate::key::JobKey;
 use crate::lod::{Chain, ChainLevel};
 use crate::mesh::{Level, LevelVertices};
 use crate::plan::MeshPlan;
 use crate::report::{LevelRecord, MeshRecord, PieceLevel, PieceRecord, Problem, SceneRecord, Severity, Status};
 use crate::scan::SceneFile;
+use crate::work::{Baked, LevelLook};
 
 /// The record of a scene with its problems.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -22,7 +19,7 @@ pub struct SceneFacts {
 }
 
 /// First byte of remembered facts; another one means another shape of [`SceneFacts`].
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 
 /// For the index.
 pub fn to_bytes(facts: &SceneFacts) -> Vec<u8> {
@@ -78,16 +75,15 @@ pub fn warning(scene: &str, place: &str, cause: &str) -> Problem {
 
 /// The records of all meshes of a scene. `switches` tells screen coverage and distance of the levels of a mesh from its
 /// radius and the levels' errors.
-pub fn meshes(
-    scene: &ReadScene,
-    chains: &BTreeMap<JobKey, Arc<Chain>>,
-    switches: impl Fn(f64, &[f64]) -> Vec<(f64, f64)>,
-) -> Vec<MeshRecord> {
+pub fn meshes(scene: &ReadScene, baked: &Baked, switches: impl Fn(f64, &[f64]) -> Vec<(f64, f64)>) -> Vec<MeshRecord> {
     let record = |source: &SourceMesh| {
         let radius = scene.radii[source.index];
-        let (chain, notes) = match &scene.plans[source.index] {
-            MeshPlan::Chain(key) => (chains.get(key).map(|chain| &**chain), Vec::new()),
-            MeshPlan::Alone(why) => (None, vec![format!("no levels: {why}")]),
+        let (chain, looks, notes) = match &scene.plans[source.index] {
+            MeshPlan::Chain { chain, look } => {
+                let looks = look.as_ref().and_then(|key| baked.looks.get(key)).map(|looks| looks.as_slice());
+                (baked.chains.get(chain).map(|chain| &**chain), looks.unwrap_or_default(), Vec::new())
+            }
+            MeshPlan::Alone(why) => (None, &[][..], vec![format!("no levels: {why}")]),
         };
         MeshRecord {
             index: source.index as u64,
@@ -100,7 +96,8 @@ pub fn meshes(
             levels: chain.map_or_else(Vec::new, |chain| {
                 let errors: Vec<f64> = chain.levels.iter().map(|level| level.error).collect();
                 let switches = switches(radius, &errors);
-                chain.levels.iter().zip(switches).map(|(level, at)| level_record(scene, level, radius, at)).collect()
+                let levels = chain.levels.iter().zip(switches).enumerate();
+                levels.map(|(i, (level, at))| level_record(scene, level, looks.get(i), radius, at)).collect()
             }),
             notes,
         }
@@ -123,7 +120,13 @@ fn pieces(scene: &ReadScene, source: &SourceMesh, chain: Option<&Chain>) -> Vec<
     .collect()
 }
 
-fn level_record(scene: &ReadScene, level: &ChainLevel, radius: f64, (coverage, distance): (f64, f64)) -> LevelRecord {
+fn level_record(
+    scene: &ReadScene,
+    level: &ChainLevel,
+    look: Option<&LevelLook>,
+    radius: f64,
+    (coverage, distance): (f64, f64),
+) -> LevelRecord {
     LevelRecord {
         number: level.target as u64 + 1,
         target: scene.todo.settings.chain.levels[level.target],
@@ -135,6 +138,11 @@ fn level_record(scene: &ReadScene, level: &ChainLevel, radius: f64, (coverage, d
         coverage,
         distance,
         stop: level.stop.into(),
+        recipe: level.recipe.clone(),
+        d_rms: look.map(|look| look.d_rms),
+        worst_view: look.map(|look| look.worst_view),
+        silhouette: look.map(|look| look.silhouette),
+        surface: look.and_then(|look| look.surface),
     }
 }
 

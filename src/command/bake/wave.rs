@@ -5,10 +5,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use rayon::prelude::*;
+use serde_json::Value;
 
 use super::Session;
 use super::record::{self, SceneFacts};
 use super::survey::Todo;
+use crate::appearance::fingerprint::Fingerprints;
+use crate::appearance::looks::Looks;
 use crate::cache::{Bucket, Cache, Lookup};
 use crate::config::Format;
 use crate::emit::{Content, Emission, Emitted, EmittedFile, OutputFolder};
@@ -17,7 +20,7 @@ use crate::gltf::document::{Container, Document};
 use crate::gltf::lod::{MeshLevel, MeshLevels, PrimitiveLevel, WriteError, add_levels, is_sealed, switches};
 use crate::gltf::package::Package;
 use crate::gltf::scene::{Scene, SourceMesh};
-use crate::gltf::{instancing, read};
+use crate::gltf::{instancing, json, read};
 use crate::identify::instances::mesh_uses;
 use crate::identify::{SubMesh, sub_meshes};
 use crate::index::{self, Seen};
@@ -27,11 +30,11 @@ use crate::mesh::hash::MeshHash;
 use crate::mesh::layout::frame;
 use crate::mesh::{Level, LevelPrimitive, LevelVertices};
 use crate::obj;
-use crate::plan::{MeshPlan, Plan};
+use crate::plan::{MeshLook, MeshPlan, Plan};
 use crate::progress::Event;
 use crate::report::{OutputRecord, Problem, SceneRecord, Severity, Status};
 use crate::scan::SceneFile;
-use crate::work::work;
+use crate::work::{Baked, work};
 
 /// Source bytes of one wave: what is in memory at a time is a small multiple of it, or of the largest scene.
 const WAVE_BYTES: u64 = 256 << 20;
@@ -62,6 +65,8 @@ pub struct ReadScene {
     pub instances: Vec<u64>,
     /// By mesh: radius of its bounding sphere.
     pub radii: Vec<f64>,
+    /// By mesh, where looks are measured.
+    looks: Vec<Option<MeshLook>>,
     /// By mesh.
     pub plans: Vec<MeshPlan>,
     seen: Seen,
@@ -98,11 +103,13 @@ impl Session<'_> {
             match result {
                 Ok(mut scene) => {
                     self.summary.scene_bytes_read += scene.bytes;
+                    let number = scenes.len();
+                    scene.looks.iter_mut().flatten().for_each(|look| look.scene = number);
                     let meshes = scene.scene.meshes.iter().zip(&scene.sub_meshes);
                     scene.plans = meshes
                         .map(|(source, subs)| {
                             let is_sealed = is_sealed(&scene.scene.document, source.index);
-                            plan.add(source, subs, is_sealed, &scene.todo.settings)
+                            plan.add(source, subs, is_sealed, scene.looks[source.index].as_ref(), &scene.todo.settings)
                         })
                         .collect();
                     scenes.push(scene);
@@ -130,8 +137,9 @@ impl Session<'_> {
         for scene in scenes {
             let chains: BTreeSet<JobKey> = scene.chain_keys().collect();
             let wanted = chains.iter().filter(|key| !is_cached(&self.cache, Bucket::Chains, key));
-            let sequences: BTreeSet<JobKey> =
-                wanted.flat_map(|key| plan.chains[key].parts.iter().filter_map(|part| part.sequence)).collect();
+            let sequences: BTreeSet<JobKey> = wanted
+                .flat_map(|key| plan.chains[key].parts.iter().flat_map(|part| part.sequences.iter().copied()))
+                .collect();
             let jobs = sequences.iter().filter(|key| !is_cached(&self.cache, Bucket::Sequences, key)).count();
             let (path, reason) = (scene.todo.file.relative.clone(), scene.todo.reason.clone());
             self.context.reporter.event(&Event::ScenePlanned { path, reason, jobs: jobs as u64 });
@@ -143,7 +151,8 @@ impl Session<'_> {
     /// Bakes a wave.
     pub fn bake_wave(&mut self, wave: Vec<Todo>, output: &OutputFolder) {
         let (scenes, plan) = self.read_wave(wave);
-        let baked = work(&plan, &self.cache, &*self.context.reporter);
+        let load = |number: usize| Arc::new(scenes[number].load_looks());
+        let baked = work(&plan, &self.cache, &load, &*self.context.reporter);
         self.summary.jobs += baked.jobs as u64;
         self.summary.cache_hits += baked.hits as u64;
         for warning in &baked.warnings {
@@ -154,7 +163,7 @@ impl Session<'_> {
         let written: Vec<Result<Written, Failure>> = scenes
             .into_par_iter()
             .map(|scene| {
-                let written = write_scene(scene, &baked.chains, output, root)?;
+                let written = write_scene(scene, &baked, output, root)?;
                 let path = written.todo.file.relative.clone();
                 let changed = 0 < written.new_files;
                 reporter.event(&Event::SceneWritten { path, bytes: written.facts.record.bytes_out, changed });
@@ -205,10 +214,43 @@ impl Session<'_> {
 impl ReadScene {
     fn chain_keys(&self) -> impl Iterator<Item = JobKey> + '_ {
         self.plans.iter().filter_map(|plan| match plan {
-            MeshPlan::Chain(key) => Some(*key),
+            MeshPlan::Chain { chain, .. } => Some(*chain),
             MeshPlan::Alone(_) => None,
         })
     }
+}
+
+impl ReadScene {
+    /// Materials and textures. What is missing is told by the warnings of the scene's record.
+    fn load_looks(&self) -> Looks {
+        let base = self.todo.file.path.parent().unwrap_or(Path::new(""));
+        Looks::load(&self.scene.document, &self.scene.buffers, base, None)
+    }
+}
+
+/// What each mesh looks like, where the settings ask for it.
+fn mesh_looks(scene: &Scene, beside: &[(PathBuf, index::Dependency)], todo: &Todo) -> Vec<Option<MeshLook>> {
+    let settings = &todo.settings;
+    if !settings.appearance.record && !settings.looks_decide() {
+        return vec![None; scene.meshes.len()];
+    }
+    let external = |address: &str| {
+        let path = &scene.dependencies.iter().find(|dependency| dependency.uri == address)?.path;
+        Some(beside.iter().find(|(found, _)| found == path)?.1.seen.as_ref()?.content)
+    };
+    let fingerprints = Fingerprints::new(&scene.document, &scene.buffers, &external);
+    let materials = |mesh: usize| {
+        let entry = scene.document.array("meshes").ok().and_then(|meshes| meshes.get(mesh));
+        let primitives = entry.and_then(|entry| entry.get("primitives")?.as_array());
+        let material = |p: &Value| p.get("material").and_then(json::integer).map(|i| i as usize);
+        primitives.map_or_else(Vec::new, |primitives| primitives.iter().map(material).collect())
+    };
+    let look = |source: &SourceMesh| {
+        let materials: Vec<Option<usize>> = materials(source.index);
+        let hash = fingerprints.of(&materials);
+        Some(MeshLook { scene: 0, hash, materials: Arc::new(materials), size: settings.appearance.size })
+    };
+    scene.meshes.iter().map(look).collect()
 }
 
 fn read_scene(todo: Todo) -> Result<ReadScene, Failure> {
@@ -240,6 +282,7 @@ fn read_scene(todo: Todo) -> Result<ReadScene, Failure> {
         .map(|seen| seen.stat.size)
         .sum();
     Ok(ReadScene {
+        looks: mesh_looks(&scene, &beside, &todo),
         instances: uses.iter().map(|used| used.instances).collect(),
         radii: scene.meshes.iter().map(radius).collect(),
         plans: Vec::new(),
@@ -299,15 +342,10 @@ pub fn target(root: &Path, relative: &str, format: Format) -> PathBuf {
     }
 }
 
-fn write_scene(
-    scene: ReadScene,
-    chains: &BTreeMap<JobKey, Arc<Chain>>,
-    output: &OutputFolder,
-    root: &Path,
-) -> Result<Written, Failure> {
+fn write_scene(scene: ReadScene, baked: &Baked, output: &OutputFolder, root: &Path) -> Result<Written, Failure> {
     let settings = &scene.todo.settings.emit.clone();
     let relative = scene.todo.file.relative.clone();
-    let levels = levels(&scene, chains);
+    let levels = levels(&scene, &baked.chains);
     let mut record = SceneRecord {
         path: relative.clone(),
         status: Status::Baked,
@@ -315,7 +353,7 @@ fn write_scene(
         bytes_in: scene.bytes,
         bytes_out: 0,
         outputs: Vec::new(),
-        meshes: record::meshes(&scene, chains, |radius, errors| switches(radius, errors, settings)),
+        meshes: record::meshes(&scene, baked, |radius, errors| switches(radius, errors, settings)),
     };
     let target = target(root, &relative, settings.format);
     let stem = target.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
@@ -350,7 +388,7 @@ fn write_scene(
     let content = if added.groups == 0 && !package.is_converted() && !is_obj(&todo.file.path) {
         Content::AsSource { copied: dependencies }
     } else {
-        Content::Files(package.finish(&stem, added.buffer).map_err(refused)?)
+        Content::Files(package.finish(&stem, added.buffer, &buffers).map_err(refused)?)
     };
     let emission = Emission { source: &todo.file.path, target: &target, content: &content };
     let emitted = output.emit(&emission).map_err(|error| Failure {
@@ -413,7 +451,7 @@ fn levels(scene: &ReadScene, chains: &BTreeMap<JobKey, Arc<Chain>>) -> Vec<MeshL
     let mut shared: BTreeMap<(JobKey, usize), Vec<SharedPart>> = BTreeMap::new();
     let mut out = Vec::new();
     for source in &scene.scene.meshes {
-        let MeshPlan::Chain(key) = &scene.plans[source.index] else { continue };
+        let MeshPlan::Chain { chain: key, .. } = &scene.plans[source.index] else { continue };
         let chain = &chains[key];
         let subs = &scene.sub_meshes[source.index];
         let levels = chain.levels.iter().enumerate().map(|(number, level)| {

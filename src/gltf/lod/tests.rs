@@ -401,7 +401,7 @@ fn a_document_in_one_piece_stays_in_one_piece() {
     source.json["buffers"][0]["uri"] = json!(format!("data:application/octet-stream;base64,{text}"));
     let (document, added) = bake(&source, &[chain(0, &own(0), &shared())]);
     let package = Package::new(document, &Buffers::default(), Vec::new(), Container::Gltf).unwrap();
-    let files = package.finish("square", added.buffer).unwrap();
+    let files = package.finish("square", added.buffer, &Buffers::default()).unwrap();
     assert_eq!(files.beside, []);
     let output = Document::parse(&files.main).unwrap();
     assert_eq!(rules::check(&source, &output), []);

@@ -39,7 +39,7 @@ fn files(source: &Document, base: &Path, container: Container) -> (Files, Vec<No
     let levels = [chain(0, &own(0), &shared())];
     let added = add_levels(&mut package.document, &levels, &Batches::new(), &EmitSettings::default()).unwrap();
     let notes = package.notes();
-    (package.finish("out", added.buffer).unwrap(), notes)
+    (package.finish("out", added.buffer, &buffers).unwrap(), notes)
 }
 
 #[test]
@@ -101,11 +101,32 @@ fn levels_of_a_gltf_go_into_a_file_with_a_name_of_its_own() {
 }
 
 #[test]
+fn levels_lie_behind_the_bytes_of_a_buffer_that_others_need() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut source = square();
+    source.container = Container::Gltf;
+    let bytes = source.bin.take().unwrap();
+    std::fs::write(folder.path().join("a.bin"), &bytes).unwrap();
+    source.json["buffers"][0]["uri"] = json!("a.bin");
+    // A second mesh in the same buffer, which gets no levels.
+    let mesh = source.json["meshes"][0].clone();
+    source.json["meshes"].as_array_mut().unwrap().push(mesh);
+    source.json["nodes"].as_array_mut().unwrap().push(json!({ "mesh": 1 }));
+    let (files, _) = files(&source, folder.path(), Container::Gltf);
+    let output = Document::parse(&files.main).unwrap();
+    assert_eq!(rules::check(&source, &output), []);
+    assert_eq!(output.array("buffers").unwrap().len(), 1);
+    assert_eq!((files.beside[0].0.as_str(), files.copied.len()), ("out.lod.bin", 0));
+    assert!(files.beside[0].1.starts_with(&bytes) && bytes.len() < files.beside[0].1.len());
+    assert_eq!(output.json["buffers"][0]["byteLength"], files.beside[0].1.len());
+}
+
+#[test]
 fn names_are_addresses() {
     let source = square();
     let buffers = Buffers::load(&source, Path::new("")).unwrap();
     let package = Package::new(source, &buffers, Vec::new(), Container::Gltf).unwrap();
-    let files = package.finish("a b#é", None).unwrap();
+    let files = package.finish("a b#é", None, &buffers).unwrap();
     assert_eq!(files.beside[0].0, "a b#é.bin");
     let output = Document::parse(&files.main).unwrap();
     assert_eq!(output.json["buffers"][0]["uri"], "a%20b%23%C3%A9.bin");

@@ -153,14 +153,21 @@ fn truncate(output: &mut Value, source: &Value, name: &str) {
     }
 }
 
-/// The BIN chunk grows, and another container keeps buffers and images in other ways.
+/// The BIN chunk or a buffer that levels were appended to grows, and another container keeps buffers and images in other ways.
 fn restore_storage(root: &mut Value, source: &Document, output: &Document) {
     let converted = source.container != output.container;
     for (i, before) in array(source, "buffers").iter().enumerate() {
         let Some(after) = root["buffers"].get_mut(i) else { continue };
-        let grows = i == 0 && output.container == Container::Glb && after.get("uri").is_none();
-        if grows && index(after, "byteLength") >= index(before, "byteLength") {
+        let is_bin = i == 0 && output.container == Container::Glb && after.get("uri").is_none();
+        // Levels may lie behind the source's bytes in a file of another name.
+        let old_views = array(source, "bufferViews").len();
+        let hosts =
+            !is_bin && array(output, "bufferViews").iter().skip(old_views).any(|v| index(v, "buffer") == Some(i));
+        if (is_bin || hosts) && index(after, "byteLength") >= index(before, "byteLength") {
             after["byteLength"] = before["byteLength"].clone();
+        }
+        if hosts {
+            copy_key(after, before, "uri");
         }
         if converted {
             copy_key(after, before, "uri");

@@ -60,11 +60,12 @@ async function load(url, options) {
   head = new DirectionalLight('head', new Vector3(0, 0, -1), scene);
   head.intensity = 3;
   new HemisphericLight('ambient', new Vector3(0, 1, 0), scene).intensity = 0.6;
-  let loader = null;
+  let complete = null;
   let arrived = 0;
   SceneLoader.OnPluginActivatedObservable.addOnce((plugin) => {
-    loader = plugin;
-    loader.onExtensionLoadedObservable.add((extension) => {
+    // Asked for now: a file without images can be complete before the scene is handed over, and it is told only once.
+    complete = plugin.whenCompleteAsync();
+    plugin.onExtensionLoadedObservable.add((extension) => {
       if (extension.name !== 'MSFT_lod') return;
       extension.onNodeLODsLoadedObservable.add((level) => (arrived = Math.max(arrived, level + 1)));
     });
@@ -74,11 +75,10 @@ async function load(url, options) {
     // Instances batched in the order of loading would draw coplanar faces in another order than the source.
     createInstances: false,
     useRangeRequests: options.ranges ?? false,
-    skipMaterials: options.bare ?? false,
     extensionOptions: { MSFT_lod: { maxLODsToLoad: options.lods ?? 100 } },
   };
   await AppendSceneAsync(url, scene, { pluginOptions: { gltf } });
-  await loader.whenCompleteAsync();
+  await complete;
   // A file's own lights raise this without limit, and with it the shader past what the driver takes.
   for (const material of scene.materials) material.maxSimultaneousLights = MAX_LIGHTS;
   const key = sortKeys();
@@ -175,12 +175,12 @@ function facts() {
   };
 }
 
-/** Babylon keeps no levels: each is seen by loading the file only as far as that level (without images, to be quick). */
+/** Babylon keeps no levels: each is seen by loading the file only as far as that level. */
 async function levels(url, options, view) {
   const found = [];
   for (let lods = 1; lods < options.levels; lods++) {
     if (lods > 1 && options.coarsestOnly) break;
-    const arrived = await load(url, { ...options, lods, bare: true });
+    const arrived = await load(url, { ...options, lods });
     const pixels = covered(await draw(view, view.size));
     found.unshift({ level: options.levels - lods, arrived, triangles: Math.round(triangles()), pixels });
   }

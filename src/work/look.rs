@@ -1,0 +1,97 @@
+//! Judging the levels of one mesh by pictures: the mesh alone, in its own space, with the materials of its scene.
+//!
+//! Always on the CPU, whose pictures are the same bit for bit on every machine: what is seen here decides bytes and
+//! recorded figures. Knows no scene and no cache.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use crate::appearance::drawable::{Drawable, Part};
+use crate::appearance::looks::Looks;
+use crate::appearance::metric::{Comparison, Reference};
+use crate::appearance::render::{Cpu, Shot};
+use crate::appearance::soup::soup;
+use crate::appearance::views::rhombicuboctahedron;
+use crate::compare::{Corners, SurfaceDistance};
+use crate::mesh::Level;
+use crate::plan::{MeshLook, PartTask};
+
+/// How a level differs from its source.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LevelLook {
+    /// d_RMS: root mean square of luminance differences over 24 views, 0…255.
+    pub d_rms: f64,
+    /// The same of the view that differs most.
+    pub worst_view: f64,
+    /// Share of the pixels covered by either that only one covers, 0…1.
+    pub silhouette: f64,
+    /// Distances between the surfaces; `None` where nothing is left of one.
+    pub surface: Option<SurfaceDistance>,
+}
+
+/// Points on each surface for [`LevelLook::surface`]: mean and root mean square are steady to about a hundredth.
+const SAMPLES: usize = 8192;
+
+/// The source of one mesh, drawn once.
+pub(super) struct Judge<'a> {
+    tasks: &'a [PartTask],
+    look: &'a MeshLook,
+    looks: Arc<Looks>,
+    /// One list for each task, one part for each primitive.
+    source: Vec<Vec<Arc<Part>>>,
+    corners: Vec<Corners>,
+    reference: Reference,
+}
+
+impl<'a> Judge<'a> {
+    pub(super) fn new(tasks: &'a [PartTask], look: &'a MeshLook, looks: &Arc<Looks>) -> Self {
+        let part = |task: &PartTask, index: usize| {
+            let material = looks.material(look.materials[task.primitives[index]]);
+            Arc::new(Part::new(&task.mesh.primitives[index], material))
+        };
+        let source: Vec<Vec<Arc<Part>>> =
+            tasks.iter().map(|task| (0..task.primitives.len()).map(|index| part(task, index)).collect()).collect();
+        let drawable = Drawable::of_parts(source.iter().flatten().cloned().collect(), looks.clone());
+        let shot = Shot { size: look.size, faces: false };
+        let reference = Reference::new(&Cpu, &drawable, drawable.frame(), &rhombicuboctahedron(), shot)
+            .expect("the configuration allows only sizes that can be drawn");
+        Self { tasks, look, looks: looks.clone(), source, corners: soup(&drawable).corners, reference }
+    }
+
+    /// d_RMS of a level: one entry for each task, `None` = as the source.
+    pub(super) fn difference(&self, levels: &[Option<Level>]) -> f64 {
+        self.compare(&self.drawable(levels)).rms
+    }
+
+    /// Everything that is recorded of a level.
+    pub(super) fn figures(&self, levels: &[Option<Level>]) -> LevelLook {
+        let drawable = self.drawable(levels);
+        let found = self.compare(&drawable);
+        LevelLook {
+            d_rms: found.rms,
+            worst_view: found.views.get(found.worst).map_or(0.0, |view| view.rms),
+            silhouette: found.silhouette,
+            surface: SurfaceDistance::measure(&self.corners, &soup(&drawable).corners, SAMPLES),
+        }
+    }
+
+    fn compare(&self, drawable: &Drawable) -> Comparison {
+        self.reference.compare(&Cpu, drawable, false).expect("the source was drawn at the same size")
+    }
+
+    fn drawable(&self, levels: &[Option<Level>]) -> Drawable {
+        let mut parts = Vec::new();
+        for ((task, source), level) in self.tasks.iter().zip(&self.source).zip(levels) {
+            let Some(level) = level else {
+                parts.extend(source.iter().cloned());
+                continue;
+            };
+            for (index, primitive) in level.primitives.iter().enumerate() {
+                let material = self.looks.material(self.look.materials[task.primitives[index]]);
+                parts.push(Arc::new(Part::of_level(&task.mesh.primitives[index], primitive, material)));
+            }
+        }
+        Drawable::of_parts(parts, self.looks.clone())
+    }
+}

@@ -1,0 +1,60 @@
+//! Levels by appearance on real assets: each is the coarsest cut that keeps to its target, so one contraction further
+//! is over it.
+
+#![allow(clippy::print_stdout)] // a test that skips must say so
+
+use lodbake::report::{Report, read};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Small enough for a test; the search is the same for all.
+const ASSETS: [&str; 4] = ["duck", "suzanne", "avocado", "water-bottle"];
+/// d_RMS, with pictures of 96 pixels a side.
+const TARGETS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+
+/// The folder of real scenes, if this machine has it. CI must have it.
+fn corpus() -> Option<PathBuf> {
+    let folder = std::env::var_os("LODBAKE_CORPUS")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/corpus"), PathBuf::from);
+    if folder.is_dir() {
+        return Some(folder.canonicalize().unwrap());
+    }
+    assert!(std::env::var_os("CI").is_none(), "CI needs the corpus: set LODBAKE_CORPUS");
+    println!("SKIPPED: there is no corpus at `{}`; set LODBAKE_CORPUS", folder.display());
+    None
+}
+
+/// Bakes one asset with the levels that `lod` lists; sequences come from the cache of the runs before.
+fn bake(folder: &Path, corpus: &Path, asset: &str, lod: &str) -> Report {
+    let mut text = format!("input = {:?}\noutput = 'out'\n", corpus.join("quality").join(asset).to_str().unwrap());
+    write!(text, "simplify.effort = 'fast'\nappearance.size = 96\nlod = [{lod}]\n").unwrap();
+    let file = folder.join("pipeline.toml");
+    std::fs::write(&file, text).unwrap();
+    assert_cmd::Command::cargo_bin("lodbake").unwrap().arg("--quiet").arg(&file).assert().success();
+    read(&folder.join("out").join("report.json")).unwrap()
+}
+
+#[test]
+fn a_level_by_appearance_is_the_coarsest_within_its_target() {
+    let Some(corpus) = corpus() else { return };
+    let mut checked = 0;
+    for asset in ASSETS {
+        let folder = tempfile::tempdir().unwrap();
+        let lod: Vec<String> = TARGETS.iter().map(|target| format!("{{ appearance = {target} }}")).collect();
+        let reached = bake(folder.path(), &corpus, asset, &lod.join(", "));
+        let reached: Vec<_> = reached.scenes.iter().flat_map(|scene| &scene.meshes).flat_map(|m| &m.levels).collect();
+        assert!(!reached.is_empty(), "{asset}");
+        for level in reached {
+            let (target, found) = (TARGETS[level.number as usize - 1], level.d_rms.unwrap());
+            assert!(found <= target, "{asset}: {found} for {target}");
+            // The next cut is the finest level with fewer triangles.
+            let next = bake(folder.path(), &corpus, asset, &format!("{{ triangles = {} }}", level.triangles - 1));
+            let next = &next.scenes[0].meshes[0].levels[0];
+            assert!(next.triangles < level.triangles && next.triangles + 4 > level.triangles, "{asset}: one step");
+            let over = next.d_rms.unwrap();
+            assert!(over > target, "{asset}: {} triangles already differ by {over} only", next.triangles);
+            checked += 1;
+        }
+    }
+    assert!(checked >= 8, "{checked} levels");
+}
