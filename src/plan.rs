@@ -38,9 +38,20 @@ pub struct ChainTask {
     /// Targets and storage.
     pub settings: ChainSettings,
     /// The recipes that `sequences` of the parts stand for; more than one where the best-looking is kept.
-    pub recipes: Vec<String>,
+    pub recipes: Vec<Recipe>,
+    /// Rounds of re-weighting by pictures that follow, with the recipe that looks best so far.
+    pub rounds: usize,
     /// What its levels are judged by, where looks decide.
     pub judged: Option<MeshLook>,
+}
+
+/// One way to simplify.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recipe {
+    /// What a report calls it.
+    pub name: String,
+    /// What it is.
+    pub settings: Settings,
 }
 
 /// What a mesh looks like: by name and place, since textures are loaded only where pictures are drawn.
@@ -137,11 +148,15 @@ impl Plan {
             return MeshPlan::Alone("every part of it has fewer triangles than `min_triangles`");
         }
         let judged = look.filter(|_| settings.looks_decide()).cloned();
-        let key = key_of(&ChainManifest { parts: &parts, chain: &settings.chain, judged: judged.as_ref() });
+        let tries = settings.simplify.effort == config::Effort::Best && settings.simplify.metric != config::Metric::Qem;
+        let rounds = if tries && judged.is_some() { ROUNDS } else { 0 };
+        let chain = &settings.chain;
+        let key = key_of(&ChainManifest { parts: &parts, chain, rounds, judged: judged.as_ref() });
         let chain = || ChainTask {
             parts,
             settings: chain_settings(&settings.chain),
-            recipes: recipes.iter().map(recipe_name).collect(),
+            recipes: recipes.iter().map(recipe).collect(),
+            rounds,
             judged,
         };
         self.chains.entry(key).or_insert_with(chain);
@@ -167,6 +182,7 @@ impl Plan {
 struct ChainManifest<'a> {
     parts: &'a [PartTask],
     chain: &'a config::ChainSettings,
+    rounds: usize,
     judged: Option<&'a MeshLook>,
 }
 
@@ -186,6 +202,9 @@ impl Manifest for ChainManifest<'_> {
             to.close();
         }
         write_chain(self.chain, to);
+        if 0 < self.rounds {
+            to.integer("rounds", self.rounds as u64);
+        }
         if let Some(look) = self.judged {
             write_look(look, to);
         }
@@ -214,20 +233,32 @@ fn write_look(look: &MeshLook, to: &mut dyn ManifestWriter) {
 const FACTORS: [(f64, f64); 7] =
     [(1.0, 1.0), (6.0, 1.0), (20.0, 1.0), (1.0, 3.0), (1.0 / 6.0, 1.0), (6.0, 3.0), (1.0, 1.0 / 6.0)];
 
-/// The recipes to try: one, but for metric `auto`. Each is a set of settings that users could write themselves, so that
+/// Rounds of effort `best`: after four, pictures hardly get better.
+const ROUNDS: usize = 4;
+
+/// The recipes to try: one, but for metric `auto` and effort `best`. Each is a set of settings that users could write themselves, so that
 /// it shares its results with them.
 fn recipes(settings: &SimplifySettings) -> Vec<SimplifySettings> {
-    if settings.metric != config::Metric::Auto {
-        return vec![settings.clone()];
+    let best = settings.effort == config::Effort::Best;
+    // Rounds come later, on top of what `balanced` makes.
+    let effort = if best { config::Effort::Balanced } else { settings.effort };
+    let settings = SimplifySettings { effort, ..settings.clone() };
+    if settings.metric == config::Metric::Qem || (settings.metric == config::Metric::Its && !best) {
+        return vec![settings];
     }
+    let candidates = settings.candidates as usize;
     let its = FACTORS.iter().map(|&(normal, texcoord)| {
         let mut recipe = SimplifySettings { metric: config::Metric::Its, ..settings.clone() };
         recipe.weights.normal *= normal;
         recipe.weights.texcoord *= texcoord;
         recipe
     });
-    let qem = SimplifySettings { metric: config::Metric::Qem, ..settings.clone() };
-    its.chain(std::iter::once(qem)).take(settings.candidates as usize).collect()
+    let qem = SimplifySettings { metric: config::Metric::Qem, ..settings };
+    its.chain(std::iter::once(qem)).take(candidates).collect()
+}
+
+fn recipe(settings: &SimplifySettings) -> Recipe {
+    Recipe { name: recipe_name(settings), settings: simplify_settings(settings) }
 }
 
 /// `its normal 0.018 texcoord 0.3`: what a report calls the winner.
@@ -259,7 +290,7 @@ fn simplify_settings(settings: &SimplifySettings) -> Settings {
         attributes: AttributeScale { normal: weights.normal, texcoord: weights.texcoord, color: weights.color },
         edges: EdgeWeights { border: weights.border, seam: weights.seam, crease: weights.crease },
         lock_border: *lock_border,
-        memoryless: *effort == config::Effort::Balanced,
+        memoryless: *effort != config::Effort::Fast,
     }
 }
 

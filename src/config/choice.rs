@@ -51,6 +51,9 @@ choice! {
         /// Costs are formed anew from the mesh as it is now where that changes the order.
         #[default]
         Balanced = "balanced",
+        /// For nightly builds: several recipes, then rounds in which each part of a surface gets the weight that
+        /// pictures of its levels ask for; each level is the best-looking one.
+        Best = "best",
     }
 }
 

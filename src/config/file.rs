@@ -126,7 +126,7 @@ pub(super) struct SimplifyTable {
     #[schemars(extend("default" = Metric::default()))]
     pub metric: Option<Metric>,
 
-    /// Number of recipes that metric `auto` tries for each mesh: more take longer and look better. Default: 3.
+    /// Number of recipes that metric `auto` and effort `best` try for each mesh: more take longer and look better. Default: 3.
     #[schemars(range(min = 1, max = 8), extend("default" = defaults::CANDIDATES))]
     pub candidates: Option<u32>,
 

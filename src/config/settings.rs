@@ -147,7 +147,9 @@ impl LevelTarget {
 impl SceneSettings {
     /// Whether looks decide any byte of the outputs.
     pub fn looks_decide(&self) -> bool {
-        self.simplify.metric == Metric::Auto || self.chain.levels.iter().any(LevelTarget::is_looked_at)
+        let SimplifySettings { metric, effort, .. } = self.simplify;
+        let tries = metric == Metric::Auto || (effort == Effort::Best && metric != Metric::Qem);
+        tries || self.chain.levels.iter().any(LevelTarget::is_looked_at)
     }
 }
 

@@ -471,16 +471,23 @@ fn root(merged: &[[u32; 2]], mut wedge: u32) -> u32 {
 }
 
 fn faces(mesh: &Mesh, weld: &Weld) -> Vec<Face> {
-    let mut faces = Vec::with_capacity(mesh.triangles());
-    for (index, primitive) in mesh.primitives.iter().enumerate() {
+    triangles(mesh, weld).flatten().collect()
+}
+
+/// Every triangle of the mesh; `None` for those without three distinct vertices, which are no faces.
+fn triangles<'a>(mesh: &'a Mesh, weld: &'a Weld) -> impl Iterator<Item = Option<Face>> + 'a {
+    mesh.primitives.iter().enumerate().flat_map(move |(index, primitive)| {
         let start = weld.stored_start[index];
-        for t in primitive.indices.chunks_exact(3) {
+        primitive.indices.chunks_exact(3).map(move |t| {
             let w = [0, 1, 2].map(|i| weld.stored[start + t[i] as usize]);
             let v = w.map(|w| weld.wedge_vertex[w as usize]);
-            if v[0] != v[1] && v[1] != v[2] && v[2] != v[0] {
-                faces.push(Face { v, w, edges: [EdgeKind::Border; 3] });
-            }
-        }
-    }
-    faces
+            let is_face = v[0] != v[1] && v[1] != v[2] && v[2] != v[0];
+            is_face.then_some(Face { v, w, edges: [EdgeKind::Border; 3] })
+        })
+    })
+}
+
+/// Of values for each triangle of the mesh, those of the surface's faces.
+pub fn of_faces<T: Copy>(mesh: &Mesh, weld: &Weld, values: &[T]) -> Vec<T> {
+    triangles(mesh, weld).zip(values).filter_map(|(face, value)| face.map(|_| *value)).collect()
 }

@@ -45,6 +45,8 @@ pub struct Its<const M: usize> {
     /// Quadrics are rebuilt from the current surface; else those of merged vertices are added up.
     memoryless: bool,
     faces: Vec<FaceQuadric<M>>,
+    /// By which the area of each face counts; none: all 1.
+    weights: Vec<f64>,
     vertices: Vec<Quadric>,
     areas: Vec<f64>,
     wedges: Vec<FieldQuadric<M>>,
@@ -53,13 +55,22 @@ pub struct Its<const M: usize> {
 
 impl<const M: usize> Its<M> {
     /// Prepares the quadrics of the whole surface, which must have exactly `M` columns.
-    pub fn new(surface: &Topology, edges: EdgeWeights, placement: Placement, memoryless: bool) -> Self {
+    /// `weights`: by which the area of each face counts, or none.
+    pub fn new(
+        surface: &Topology,
+        edges: EdgeWeights,
+        placement: Placement,
+        memoryless: bool,
+        weights: Vec<f64>,
+    ) -> Self {
+        let weight = |face: usize| weights.get(face).copied().unwrap_or(1.0);
         assert!(surface.columns == M, "the metric is built for the surface's columns");
         let mut out = Self {
             edges,
             placement,
             memoryless,
-            faces: surface.faces.iter().map(|face| face_quadric(surface, face)).collect(),
+            faces: (surface.faces.iter().enumerate()).map(|(i, face)| face_quadric(surface, face, weight(i))).collect(),
+            weights,
             vertices: vec![Quadric::default(); surface.positions.len()],
             areas: vec![0.0; surface.positions.len()],
             wedges: vec![FieldQuadric::default(); surface.wedge_vertex.len()],
@@ -261,7 +272,8 @@ impl<const M: usize> ErrorMetric for Its<M> {
             return;
         }
         for &id in surface.ring(kept) {
-            self.faces[id as usize] = face_quadric(surface, &surface.faces[id as usize]);
+            let weight = self.weights.get(id as usize).copied().unwrap_or(1.0);
+            self.faces[id as usize] = face_quadric(surface, &surface.faces[id as usize], weight);
         }
         let mut neighbours = std::mem::take(&mut self.neighbours);
         surface.neighbours(kept, &mut neighbours);
@@ -284,11 +296,11 @@ fn near(p: [f64; 3], a: [f64; 3], b: [f64; 3]) -> bool {
 }
 
 #[inline]
-fn face_quadric<const M: usize>(surface: &Topology, face: &Face) -> FaceQuadric<M> {
+fn face_quadric<const M: usize>(surface: &Topology, face: &Face, weight: f64) -> FaceQuadric<M> {
     let p = surface.corners(face);
     let normal = cross(sub(p[1], p[0]), sub(p[2], p[0]));
     let length = dot(normal, normal).sqrt();
-    let area = 0.5 * length;
+    let area = 0.5 * length * weight;
     let plane = if length > 0.0 {
         let unit = scale(normal, 1.0 / length);
         Quadric::plane(unit, -dot(unit, p[0]), area)

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::mesh::Mesh;
 use crate::mesh::layout::{AttributeScale, Layout};
-use crate::mesh::topology::{Contraction, EdgeKind, Topology};
+use crate::mesh::topology::{self, Contraction, EdgeKind, Topology};
 use crate::metric::its::{EdgeWeights, Its};
 use crate::metric::qem::Qem;
 use crate::metric::{ErrorMetric, Placement, Price};
@@ -56,11 +56,18 @@ pub struct Settings {
 
 /// Simplifies `mesh` as far as it goes and returns the recorded sequence.
 pub fn simplify(mesh: &Mesh, settings: &Settings) -> Progressive {
+    simplify_weighted(mesh, settings, &[])
+}
+
+/// The same with a weight for each triangle (of all primitives, in order; all 1 if there are none), by which its area
+/// counts. Only `its` heeds them.
+pub fn simplify_weighted(mesh: &Mesh, settings: &Settings, weights: &[f64]) -> Progressive {
     let layout = Layout::new(mesh, settings.attributes);
     let (mut surface, weld) = Topology::new(mesh, &layout);
+    let weights = if weights.is_empty() { Vec::new() } else { topology::of_faces(mesh, &weld, weights) };
     let recorder = Recorder::new(mesh, &surface, &layout, weld);
     let locks = Locks::new(&surface, settings.lock_border);
-    build(&mut surface, settings, &locks, recorder)
+    build(&mut surface, settings, weights, &locks, recorder)
 }
 
 /// Numbers of columns that meshes have: normals, + one or two texture sets, + colours. Others are padded with zeros.
@@ -68,7 +75,13 @@ const WIDTHS: [usize; 6] = [3, 5, 7, 9, 16, 32];
 
 /// The only place that builds a metric. The number of columns is a compile-time constant of `its`, so that its inner
 /// loops have known lengths.
-fn build(surface: &mut Topology, settings: &Settings, locks: &Locks, recorder: Recorder) -> Progressive {
+fn build(
+    surface: &mut Topology,
+    settings: &Settings,
+    weights: Vec<f64>,
+    locks: &Locks,
+    recorder: Recorder,
+) -> Progressive {
     if settings.metric == MetricKind::Qem {
         let metric = Qem::new(surface, settings.edges.border, settings.placement);
         return run(surface, metric, locks, recorder);
@@ -79,7 +92,7 @@ fn build(surface: &mut Topology, settings: &Settings, locks: &Locks, recorder: R
         ($($m:literal)*) => {
             match width {
                 $($m => {
-                    let metric = Its::<$m>::new(surface, settings.edges, settings.placement, settings.memoryless);
+                    let metric = Its::<$m>::new(surface, settings.edges, settings.placement, settings.memoryless, weights);
                     run(surface, metric, locks, recorder)
                 })*
                 _ => unreachable!("a width of the list"),

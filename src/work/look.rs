@@ -59,6 +59,16 @@ impl<'a> Judge<'a> {
         Self { tasks, look, looks: looks.clone(), source, corners: soup(&drawable).corners, reference }
     }
 
+    /// The source itself. Faces are numbered part by part and primitive by primitive, as in the meshes.
+    pub(super) fn source_drawable(&self) -> Drawable {
+        Drawable::of_parts(self.source.iter().flatten().cloned().collect(), self.looks.clone())
+    }
+
+    /// Pixels on each side of the pictures.
+    pub(super) fn size(&self) -> u32 {
+        self.look.size
+    }
+
     /// d_RMS of a level: one entry for each task, `None` = as the source.
     pub(super) fn difference(&self, levels: &[Option<Level>]) -> f64 {
         self.compare(&self.drawable(levels)).rms
@@ -80,7 +90,7 @@ impl<'a> Judge<'a> {
         self.reference.compare(&Cpu, drawable, false).expect("the source was drawn at the same size")
     }
 
-    fn drawable(&self, levels: &[Option<Level>]) -> Drawable {
+    pub(super) fn drawable(&self, levels: &[Option<Level>]) -> Drawable {
         let mut parts = Vec::new();
         for ((task, source), level) in self.tasks.iter().zip(&self.source).zip(levels) {
             let Some(level) = level else {

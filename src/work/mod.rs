@@ -4,6 +4,7 @@
 //! where a chain is missing. Pictures are drawn where they decide a level or are recorded, scene by scene, so that the
 //! textures of one scene at a time are in memory.
 
+mod best;
 mod look;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,13 +18,15 @@ use crate::appearance::looks::Looks;
 use crate::cache::{Bucket, Cache, Lookup};
 use crate::key::JobKey;
 use crate::lod::{Chain, ChainLevel, Part, chain};
-use crate::plan::{ChainTask, LookTask, MeshLook, Plan, SequenceTask};
+use crate::mesh::Level;
+use crate::plan::{ChainTask, LookTask, MeshLook, PartTask, Plan, SequenceTask};
 use crate::progress::{Event, Reporter};
 use crate::simplify::progressive::Progressive;
-use crate::simplify::simplify;
+use crate::simplify::{simplify, simplify_weighted};
 
 pub use look::LevelLook;
 
+use best::Loop;
 use look::Judge;
 
 /// Materials and textures of a scene of the plan, by its number.
@@ -94,30 +97,76 @@ fn by_scene<T>(mut tasks: Vec<T>, scene: impl Fn(&T) -> usize) -> Vec<Vec<T>> {
     groups
 }
 
-/// Cuts a chain; of several recipes, each level is taken from the one that looks best.
+/// Cuts a chain; of several recipes and rounds, each level is taken from the one that looks best.
 fn cut(task: &ChainTask, sequences: &BTreeMap<JobKey, Progressive>, looks: Option<&Arc<Looks>>) -> Chain {
     let judge = task.judged.as_ref().zip(looks).map(|(look, looks)| Judge::new(&task.parts, look, looks));
-    let difference =
-        |levels: &[Option<crate::mesh::Level>]| judge.as_ref().map_or(0.0, |judge| judge.difference(levels));
-    let candidates: Vec<Chain> = (0..task.recipes.len())
+    let Some(judge) = &judge else {
+        let own: Vec<Option<&Progressive>> = task.parts.iter().map(|part| recorded(part, 0, sequences)).collect();
+        return chain(&parts(&task.parts, &own), &task.settings, None);
+    };
+    let difference = |levels: &[Option<Level>]| judge.difference(levels);
+    let mut candidates: Vec<Chain> = (0..task.recipes.len())
         .map(|recipe| {
-            let sequence = |part: &crate::plan::PartTask| part.sequences.get(recipe).map(|key| &sequences[key]);
-            let parts: Vec<Part> = (task.parts.iter())
-                .map(|p| Part { mesh: &p.mesh, sequence: sequence(p), shareable: p.shareable })
-                .collect();
-            let mut chain = chain(&parts, &task.settings, judge.is_some().then_some(&difference));
-            if 1 < task.recipes.len() {
-                chain.levels.iter_mut().for_each(|level| level.recipe = Some(task.recipes[recipe].clone()));
-            }
-            chain
+            let own: Vec<_> = task.parts.iter().map(|part| recorded(part, recipe, sequences)).collect();
+            named(chain(&parts(&task.parts, &own), &task.settings, Some(&difference)), task, recipe, "")
         })
         .collect();
-    best_of(candidates, |level| difference(&level.parts))
+    if task.rounds == 0 {
+        return best_of(candidates, difference);
+    }
+    let around = Loop::new(judge, &task.parts);
+    let sum = |chain: &Chain| chain.levels.iter().map(|level| around.difference(&level.parts)).sum::<f64>();
+    let sums: Vec<f64> = candidates.iter().map(sum).collect();
+    let winner = (0..sums.len()).reduce(|best, next| if sums[next] < sums[best] { next } else { best }).unwrap_or(0);
+    let start = around.visibility();
+    let mut weights = start.clone();
+    for round in 0..=task.rounds {
+        let made: Vec<Option<Progressive>> = (task.parts.par_iter().zip(&weights.0))
+            .map(|(part, weights)| {
+                let is_left = part.sequences.is_empty();
+                (!is_left).then(|| simplify_weighted(&part.mesh, &task.recipes[winner].settings, weights))
+            })
+            .collect();
+        let own: Vec<Option<&Progressive>> = made.iter().map(Option::as_ref).collect();
+        let next = chain(&parts(&task.parts, &own), &task.settings, Some(&difference));
+        if round < task.rounds {
+            let levels: Vec<Vec<Option<Level>>> = next.levels.iter().map(|level| level.parts.clone()).collect();
+            weights = around.again(&weights, &start, &levels);
+        }
+        candidates.push(named(next, task, winner, &format!(", round {round}")));
+    }
+    best_of(candidates, |levels| around.difference(levels))
+}
+
+fn recorded<'a>(
+    part: &PartTask,
+    recipe: usize,
+    sequences: &'a BTreeMap<JobKey, Progressive>,
+) -> Option<&'a Progressive> {
+    part.sequences.get(recipe).map(|key| &sequences[key])
+}
+
+fn parts<'a>(tasks: &'a [PartTask], sequences: &[Option<&'a Progressive>]) -> Vec<Part<'a>> {
+    let part = |(task, sequence): (&'a PartTask, &Option<&'a Progressive>)| Part {
+        mesh: &task.mesh,
+        sequence: *sequence,
+        shareable: task.shareable,
+    };
+    tasks.iter().zip(sequences).map(part).collect()
+}
+
+/// Notes in every level what made it, where there was a choice.
+fn named(mut chain: Chain, task: &ChainTask, recipe: usize, more: &str) -> Chain {
+    if 1 < task.recipes.len() + task.rounds {
+        let name = format!("{}{more}", task.recipes[recipe].name);
+        chain.levels.iter_mut().for_each(|level| level.recipe = Some(name.clone()));
+    }
+    chain
 }
 
 /// For each target the level that differs least; where looks were the target, the one with the fewest triangles. The
 /// first of equals. Levels that are no coarser than the one before them are left out.
-fn best_of(mut candidates: Vec<Chain>, difference: impl Fn(&ChainLevel) -> f64) -> Chain {
+fn best_of(mut candidates: Vec<Chain>, difference: impl Fn(&[Option<Level>]) -> f64) -> Chain {
     if candidates.len() < 2 {
         return candidates.pop().unwrap_or(Chain { levels: Vec::new() });
     }
@@ -130,7 +179,7 @@ fn best_of(mut candidates: Vec<Chain>, difference: impl Fn(&ChainLevel) -> f64) 
     for levels in by_target.into_values() {
         let rank = |level: &ChainLevel| match level.stop {
             crate::lod::Stop::LookLimit => level.triangles as f64,
-            _ => difference(level),
+            _ => difference(&level.parts),
         };
         let ranked = levels.into_iter().map(|level| (rank(&level), level));
         let best = ranked.reduce(|best, next| if next.0 < best.0 { next } else { best });
