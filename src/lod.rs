@@ -164,24 +164,18 @@ struct Cutter<'a> {
     settings: &'a ChainSettings,
     replay: Replay<'a>,
     done: usize,
-    source: Surface,
-    radius: f64,
+    source: Source<'a>,
 }
 
 impl<'a> Cutter<'a> {
     fn new(part: &Part<'a>, sequence: &'a Progressive, settings: &'a ChainSettings) -> Self {
-        let triangles = part.mesh.primitives.iter().flat_map(|p| {
-            let positions = p.positions();
-            p.indices.chunks_exact(3).map(move |t| [0, 1, 2].map(|i| positions[t[i] as usize].map(f64::from)))
-        });
         Self {
             part: *part,
             sequence,
             settings,
             replay: Replay::new(part.mesh, sequence),
             done: 0,
-            source: Surface::new(triangles.collect()),
-            radius: crate::mesh::layout::frame(&part.mesh.primitives).1,
+            source: Source::new(part.mesh),
         }
     }
 
@@ -189,7 +183,7 @@ impl<'a> Cutter<'a> {
     /// halves finds a cut whose successor (at the search's resolution) is over it.
     fn cut_within(&self, target: Target) -> usize {
         let limit = match target {
-            Target::ErrorOfRadius(fraction) => fraction * self.radius,
+            Target::ErrorOfRadius(fraction) => fraction * self.source.radius,
             Target::Error(limit) => limit,
             Target::Ratio(_) | Target::Triangles(_) => return 0,
         };
@@ -202,7 +196,7 @@ impl<'a> Cutter<'a> {
             replay.advance(middle.min(self.sequence.steps.len()));
             let cut = replay.primitives();
             let error =
-                if cut.iter().all(|c| c.indices.is_empty()) { f64::INFINITY } else { self.error(&mut replay, &cut) };
+                if cut.iter().all(|c| c.indices.is_empty()) { f64::INFINITY } else { self.error(&replay, &cut) };
             if error <= limit {
                 within = middle;
             } else {
@@ -221,14 +215,18 @@ impl<'a> Cutter<'a> {
         self.replay.advance(cut);
         let cuts = self.replay.primitives();
         let sources = &self.part.mesh.primitives;
-        let error = measured(&self.source, self.part.mesh, &mut self.replay, &cuts);
-        let primitives =
+        let primitives: Vec<LevelPrimitive> =
             cuts.into_iter().enumerate().map(|(index, cut)| self.primitive(index, &sources[index], cut)).collect();
+        let error = self.source.deviation(self.source.triangles(&primitives));
         Level { primitives, error }
     }
 
-    fn error(&self, replay: &mut Replay, cuts: &[CutPrimitive]) -> f64 {
-        measured(&self.source, self.part.mesh, replay, cuts)
+    fn error(&self, replay: &Replay, cuts: &[CutPrimitive]) -> f64 {
+        let corner = |cut: &CutPrimitive, i: u32| replay.wedge_position(cut.wedges[i as usize]).map(f64::from);
+        let of = |cut: &CutPrimitive| -> Vec<[[f64; 3]; 3]> {
+            cut.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|i| corner(cut, t[i]))).collect()
+        };
+        self.source.deviation(cuts.iter().flat_map(of).collect())
     }
 
     fn primitive(&self, index: usize, source: &Primitive, mut cut: CutPrimitive) -> LevelPrimitive {
@@ -282,25 +280,55 @@ fn order_by_use(cut: &mut CutPrimitive) {
 /// Points measured in each direction: beyond this many a further one hardly ever raises the maximum.
 const MOST_SAMPLES: usize = 16384;
 
-/// Largest distance between source and level: from source vertices to the level, and from the level's corners and
-/// middles of triangles to the source.
-fn measured(source: &Surface, mesh: &Mesh, replay: &mut Replay, cuts: &[CutPrimitive]) -> f64 {
-    let corners = |cut: &CutPrimitive, t: &[u32]| {
-        [0, 1, 2].map(|i| replay.wedge_position(cut.wedges[t[i] as usize]).map(f64::from))
-    };
-    let triangles: Vec<[[f64; 3]; 3]> =
-        cuts.iter().flat_map(|cut| cut.indices.chunks_exact(3).map(move |t| corners(cut, t))).collect();
-    let middles = triangles.iter().map(|t| [0, 1, 2].map(|i| (t[0][i] + t[1][i] + t[2][i]) / 3.0));
-    let points = middles.chain(triangles.iter().map(|t| t[0]));
-    let back = largest_distance(thinned(points, triangles.len() * 2), source, 0.0);
-    if triangles.is_empty() {
-        // Nothing is left of it: as far off as it was large.
-        return 2.0 * crate::mesh::layout::frame(&mesh.primitives).1;
+/// Largest distance of each of `levels` from `mesh`, as [`chain`] measures it.
+pub fn deviation(mesh: &Mesh, levels: &[&Level]) -> Vec<f64> {
+    let source = Source::new(mesh);
+    levels.iter().map(|level| source.deviation(source.triangles(&level.primitives))).collect()
+}
+
+/// A source that levels are measured against.
+struct Source<'a> {
+    mesh: &'a Mesh,
+    surface: Surface,
+    radius: f64,
+}
+
+impl<'a> Source<'a> {
+    fn new(mesh: &'a Mesh) -> Self {
+        let triangles = mesh.primitives.iter().flat_map(|p| triangles(p.positions(), &p.indices)).collect();
+        Self { mesh, surface: Surface::new(triangles), radius: crate::mesh::layout::frame(&mesh.primitives).1 }
     }
-    let level = Surface::new(triangles.clone());
-    let total = mesh.vertices();
-    let vertices = mesh.primitives.iter().flat_map(used_positions);
-    largest_distance(thinned(vertices, total), &level, back)
+
+    /// Corners of the triangles of a level.
+    fn triangles(&self, level: &[LevelPrimitive]) -> Vec<[[f64; 3]; 3]> {
+        let of = |(source, primitive): (&'a Primitive, &LevelPrimitive)| -> Vec<[[f64; 3]; 3]> {
+            let positions = match &primitive.vertices {
+                LevelVertices::Source => source.positions(),
+                LevelVertices::Own(own) => own.positions(),
+            };
+            triangles(positions, &primitive.indices).collect()
+        };
+        self.mesh.primitives.iter().zip(level).flat_map(of).collect()
+    }
+
+    /// Largest distance between source and level: from source vertices to the level, and from the level's corners and
+    /// middles of triangles to the source.
+    fn deviation(&self, left: Vec<[[f64; 3]; 3]>) -> f64 {
+        if left.is_empty() {
+            // Nothing is left of it: as far off as it was large.
+            return 2.0 * self.radius;
+        }
+        let middles = left.iter().map(|t| [0, 1, 2].map(|i| (t[0][i] + t[1][i] + t[2][i]) / 3.0));
+        let points = middles.chain(left.iter().map(|t| t[0]));
+        let back = largest_distance(thinned(points, left.len() * 2), &self.surface, 0.0);
+        let level = Surface::new(left);
+        let vertices = self.mesh.primitives.iter().flat_map(used_positions);
+        largest_distance(thinned(vertices, self.mesh.vertices()), &level, back)
+    }
+}
+
+fn triangles<'a>(positions: &'a [[f32; 3]], indices: &'a [u32]) -> impl Iterator<Item = [[f64; 3]; 3]> + 'a {
+    indices.chunks_exact(3).map(move |t| [0, 1, 2].map(|i| positions[t[i] as usize].map(f64::from)))
 }
 
 fn used_positions(primitive: &Primitive) -> impl Iterator<Item = [f64; 3]> + '_ {
