@@ -2,7 +2,7 @@
 //!
 //! One thread. All take turns in one run, so that what else the machine does hits all alike; the ratio of two medians
 //! would mix different minutes, which is why no harness that times one function after the other is used. Seconds are
-//! the least and the median of the rounds, ratios those of the least. The work of lodbake is all of a bake but files: weld, topology,
+//! CPU time, the least and the median of the rounds, ratios those of the least. The work of lodbake is all of a bake but files: weld, topology,
 //! sequence, cuts, vertices of each level, measured errors (also shown apart). That of meshoptimizer is
 //! `meshopt_simplifyWithAttributes` from level to level and nothing else.
 //!
@@ -12,6 +12,7 @@
 #![expect(clippy::print_stdout, reason = "a benchmark prints its table")]
 
 mod assets;
+mod clock;
 mod memory;
 mod work;
 

@@ -1,16 +1,17 @@
 //! The three works that are compared, each on one mesh and in one thread.
 
-use std::time::Instant;
-
-use lodbake::lod::{ChainSettings, Part, Storage, Target, chain, deviation};
+use lodbake::lod::{ChainSettings, Part, Source, Storage, Target, chain};
+use lodbake::mesh::Mesh;
 use lodbake::mesh::layout::{AttributeScale, frame};
-use lodbake::mesh::{Level, Mesh};
 use lodbake::metric::Placement;
 use lodbake::metric::its::EdgeWeights;
+use lodbake::simplify::progressive::Progressive;
+use lodbake::simplify::replay::{Replay, Welded};
 use lodbake::simplify::{MetricKind, Settings, simplify};
 use meshopt::{SimplifyOptions, VertexDataAdapter, simplify_with_attributes_and_locks};
 
 use crate::assets::Asset;
+use crate::clock::now;
 
 /// Shares of the source's triangles.
 const RATIOS: [f64; 4] = [0.5, 0.25, 0.1, 0.05];
@@ -83,23 +84,32 @@ fn own(mesh: &Mesh, memoryless: bool) -> Report {
     };
     let targets = RATIOS.map(Target::Ratio).to_vec();
     let settings_of_chain = ChainSettings { targets, storage: Storage::Smallest, vertex_cache: true };
-    let began = Instant::now();
+    let began = now();
     let sequence = simplify(mesh, &settings);
-    let simplified = Instant::now();
+    let simplified = now();
     let part = Part { mesh, sequence: Some(&sequence), shareable: false };
     let chain = chain(&[part], &settings_of_chain);
-    let chained = Instant::now();
-    // Once more, to know its share of the chain.
-    let levels: Vec<&Level> = chain.levels.iter().filter_map(|level| level.parts[0].as_ref()).collect();
-    let errors = deviation(mesh, &levels);
-    let measure = chained.elapsed().as_secs_f64();
-    let radius = frame(&mesh.primitives).1;
-    Report {
-        sequence: (simplified - began).as_secs_f64(),
-        levels_secs: (chained - simplified).as_secs_f64() - measure,
-        measure,
-        levels: levels.iter().zip(errors).map(|(level, error)| (level.triangles(), error / radius)).collect(),
+    let chained = now();
+    let levels = chain.levels.iter().map(|level| (level.triangles, level.error / frame(&mesh.primitives).1)).collect();
+    let measure = measure(mesh, &sequence);
+    Report { sequence: simplified - began, levels_secs: chained - simplified - measure, measure, levels }
+}
+
+/// Measures the levels once more, to know its share of the chain.
+fn measure(mesh: &Mesh, sequence: &Progressive) -> f64 {
+    let welded = Welded::new(mesh);
+    let mut replay = Replay::new(mesh, &welded, sequence);
+    let mut began = now();
+    let source = Source::new(mesh, &welded);
+    let mut spent = now() - began;
+    for ratio in RATIOS {
+        replay.advance(sequence.cut_at((mesh.triangles() as f64 * ratio).round() as usize));
+        let cuts = replay.primitives();
+        began = now();
+        std::hint::black_box(source.deviation(&mut replay, &cuts));
+        spent += now() - began;
     }
+    spent
 }
 
 fn peer(asset: &Asset) -> Report {
@@ -109,7 +119,7 @@ fn peer(asset: &Asset) -> Report {
     let free = vec![false; flat.positions.len()];
     let mut levels = Vec::new();
     let mut indices = Vec::new();
-    let began = Instant::now();
+    let began = now();
     for ratio in RATIOS {
         let target = (flat.indices.len() as f64 / 3.0 * ratio).round() as usize * 3;
         let from = if indices.is_empty() { &flat.indices } else { &indices };
@@ -127,5 +137,5 @@ fn peer(asset: &Asset) -> Report {
         );
         levels.push((indices.len() / 3, f64::NAN));
     }
-    Report { sequence: began.elapsed().as_secs_f64(), levels_secs: 0.0, measure: 0.0, levels }
+    Report { sequence: now() - began, levels_secs: 0.0, measure: 0.0, levels }
 }

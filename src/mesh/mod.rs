@@ -126,18 +126,13 @@ impl Primitive {
     /// # Panics
     /// If there is no `POSITION` of three components: the reader refuses such primitives.
     pub fn positions(&self) -> &[[f32; 3]] {
-        positions(&self.attributes)
+        bytemuck::cast_slice(&self.attribute("POSITION").expect("a primitive has positions").values)
     }
 
     /// Number of triangles.
     pub fn triangles(&self) -> usize {
         self.indices.len() / 3
     }
-}
-
-fn positions(attributes: &[Attribute]) -> &[[f32; 3]] {
-    let found = attributes.iter().find(|a| a.name == "POSITION").expect("a primitive has positions");
-    bytemuck::cast_slice(&found.values)
 }
 
 /// A sub-mesh: the smallest group of one mesh's primitives that share border vertices. It is the unit that is
@@ -178,13 +173,6 @@ pub struct LevelOwnVertices {
     pub attributes: Vec<Attribute>,
     /// As [`Primitive::targets`].
     pub targets: Vec<Vec<Attribute>>,
-}
-
-impl LevelOwnVertices {
-    /// `POSITION` as triples, as [`Primitive::positions`].
-    pub fn positions(&self) -> &[[f32; 3]] {
-        positions(&self.attributes)
-    }
 }
 
 /// One primitive at one level.

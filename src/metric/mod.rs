@@ -24,8 +24,6 @@ pub enum Placement {
 pub struct Price {
     /// Ranks pairs; metrics are not comparable with each other. Not negative.
     pub cost: f64,
-    /// Geometric part as a length in units of the mesh's radius.
-    pub error: f64,
     /// Where the vertex that stays goes, unit frame.
     pub position: [f64; 3],
     /// The second vertex of the pair stays, not the first (matters for [`Placement::Subset`] alone).
