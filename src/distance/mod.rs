@@ -23,7 +23,7 @@ struct Node {
 }
 
 /// Triangles in a leaf.
-const LEAF: usize = 4;
+const LEAF: usize = 8;
 
 impl Surface {
     /// Builds the hierarchy over triangles given by their corners.
@@ -125,6 +125,13 @@ impl Item {
     }
 }
 
+/// Bits that order as the number does.
+#[inline]
+fn ordered(x: f32) -> u32 {
+    let bits = x.to_bits();
+    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
+}
+
 /// Splits `items`, which start at `first`, at the median of the longest axis of their sums, as often as needed; adds the
 /// nodes without bounds. Halving keeps the depth under 32, so that a fixed stack of 64 entries is enough for any search.
 fn split(items: &mut [Item], first: usize, nodes: &mut Vec<Node>) {
@@ -143,7 +150,7 @@ fn split(items: &mut [Item], first: usize, nodes: &mut Vec<Node>) {
     let extent = [0, 1, 2].map(|i| high[i] - low[i]);
     let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0);
     let middle = items.len() / 2;
-    items.select_nth_unstable_by(middle, |a, b| a.sum[axis].total_cmp(&b.sum[axis]).then(a.index.cmp(&b.index)));
+    items.select_nth_unstable_by_key(middle, |item| u64::from(ordered(item.sum[axis])) << 32 | u64::from(item.index));
     let (left, right) = items.split_at_mut(middle);
     nodes[node].count = 0;
     // The first child follows its parent.

@@ -5,6 +5,8 @@
 //! always shows that the point cannot be the one that is furthest off. Only the others are searched for in a tree. The
 //! result is that of a search for every point.
 
+use std::sync::OnceLock;
+
 use super::{Surface, squared_distance_to_triangle};
 use crate::quadric::{dot, sub};
 
@@ -16,6 +18,8 @@ pub struct Sheet<'a> {
     /// Faces of each vertex lie from here to the next vertex's start in `ring`.
     start: Vec<u32>,
     ring: Vec<u32>,
+    /// Made when the first point needs it.
+    tree: OnceLock<Surface>,
 }
 
 /// Longest walk, in edges.
@@ -40,7 +44,7 @@ impl<'a> Sheet<'a> {
                 *at += 1;
             }
         }
-        Self { positions, triangles, start, ring }
+        Self { positions, triangles, start, ring, tree: OnceLock::new() }
     }
 
     /// The triangles, as vertices.
@@ -68,7 +72,12 @@ impl<'a> Sheet<'a> {
     #[inline]
     fn to_ring(&self, p: [f64; 3], vertex: u32, enough: f64) -> f64 {
         let mut nearest = f64::INFINITY;
-        for &face in self.ring(vertex) {
+        let ring = self.ring(vertex);
+        let off = sub(self.position(vertex), p);
+        if !ring.is_empty() && dot(off, off) <= enough {
+            return dot(off, off);
+        }
+        for &face in ring {
             nearest = nearest.min(squared_distance_to_triangle(p, &self.corners(self.triangles[face as usize])));
             if nearest <= enough {
                 break;
@@ -115,7 +124,7 @@ impl<'a> Sheet<'a> {
     /// `least`; else `least`. `∞` if there is no surface but there are points.
     pub fn largest_distance(&self, points: impl Iterator<Item = ([f64; 3], u32)>, least: f64) -> f64 {
         let mut most = least * least;
-        let mut search = Search { sheet: self, asked: 0, tree: None };
+        let mut search = Search { sheet: self, asked: 0 };
         let mut doubtful: Vec<(f64, [f64; 3])> = Vec::new();
         let mut room = FEW_DOUBTS;
         for (p, vertex) in points {
@@ -145,7 +154,6 @@ const FEW_SEARCHES: usize = 4;
 struct Search<'a> {
     sheet: &'a Sheet<'a>,
     asked: usize,
-    tree: Option<Surface>,
 }
 
 impl Search<'_> {
@@ -162,11 +170,8 @@ impl Search<'_> {
     fn squared_distance_above(&mut self, p: [f64; 3], enough: f64) -> f64 {
         self.asked += 1;
         let mut triangles = self.sheet.triangles.iter().map(|&t| self.sheet.corners(t));
-        if FEW_SEARCHES < self.asked {
-            return self
-                .tree
-                .get_or_insert_with(|| Surface::new(triangles.collect()))
-                .squared_distance_above(p, enough);
+        if FEW_SEARCHES < self.asked || self.sheet.tree.get().is_some() {
+            return self.sheet.tree.get_or_init(|| Surface::new(triangles.collect())).squared_distance_above(p, enough);
         }
         let mut nearest = f64::INFINITY;
         while enough < nearest

@@ -151,8 +151,8 @@ pub struct Topology {
     ring_start: Vec<u32>,
     ring_len: Vec<u32>,
     ring_pool: Vec<Corner>,
-    /// Edges at a vertex while they are classified: the other end, the corner, which edge.
-    spokes: Vec<(u32, Corner, usize)>,
+    /// The other two vertices of the faces at a vertex while its edges are classified.
+    spokes: Vec<[u32; 2]>,
 }
 
 impl Topology {
@@ -474,18 +474,24 @@ impl Topology {
     pub fn classify_edges(&mut self, vertex: u32) {
         let mut spokes = std::mem::take(&mut self.spokes);
         spokes.clear();
-        for &corner in self.ring(vertex) {
+        spokes.extend(self.ring(vertex).iter().map(|corner| {
             let face = &self.faces[corner.face()];
-            spokes.push((face.v[NEXT[corner.at()]], corner, corner.at()));
-            spokes.push((face.v[PREVIOUS[corner.at()]], corner, PREVIOUS[corner.at()]));
-        }
-        for (index, &(end, corner, edge)) in spokes.iter().enumerate() {
-            let mut others = spokes.iter().enumerate().filter(|(i, other)| *i != index && other.0 == end);
-            let kind = match (others.next(), others.next()) {
-                (Some((_, &(_, across, _))), None) => self.kind_between(corner, across, end),
-                _ => EdgeKind::Border,
-            };
-            self.kinds[corner.face()][edge] = kind;
+            [face.v[NEXT[corner.at()]], face.v[PREVIOUS[corner.at()]]]
+        }));
+        for (index, &ends) in spokes.iter().enumerate() {
+            let corner = self.ring(vertex)[index];
+            for (end, edge) in ends.into_iter().zip([corner.at(), PREVIOUS[corner.at()]]) {
+                // This face is one of them.
+                let faces = spokes.iter().filter(|other| other[0] == end || other[1] == end).count();
+                let kind = if faces == 2 {
+                    let other = |(i, other): (usize, &[u32; 2])| (i != index && other.contains(&end)).then_some(i);
+                    let across = spokes.iter().enumerate().find_map(other).expect("the other of two");
+                    self.kind_between(corner, self.ring(vertex)[across], end)
+                } else {
+                    EdgeKind::Border
+                };
+                self.kinds[corner.face()][edge] = kind;
+            }
         }
         self.spokes = spokes;
     }

@@ -49,6 +49,8 @@ pub struct Its {
     means: Vec<Vec4>,
     /// Their weights: areas.
     weights: Vec<f32>,
+    /// Vertices whose surroundings have changed since they were gathered; empty if not memoryless.
+    stale: Vec<bool>,
     neighbours: Vec<u32>,
 }
 
@@ -64,6 +66,7 @@ impl Its {
             forms: vec![Form::default(); surface.positions.len()],
             means: vec![Vec4::ZERO; wedges * surface.columns],
             weights: vec![0.0; wedges],
+            stale: vec![false; if memoryless { surface.positions.len() } else { 0 }],
             neighbours: Vec::new(),
         };
         for vertex in 0..surface.positions.len() as u32 {
@@ -104,6 +107,9 @@ impl Its {
             }
         }
         self.forms[vertex as usize] = form;
+        if self.memoryless {
+            self.stale[vertex as usize] = false;
+        }
     }
 
     /// Adds what the face of one corner gives to the corner's vertex and wedge. Gradients are summed, not yet averaged.
@@ -355,6 +361,17 @@ impl Its {
 
 impl ErrorMetric for Its {
     #[inline]
+    fn prepare(&mut self, surface: &Topology, a: u32, b: u32) {
+        if self.memoryless {
+            for vertex in [a, b] {
+                if self.stale[vertex as usize] {
+                    self.gather(surface, vertex);
+                }
+            }
+        }
+    }
+
+    #[inline]
     fn price(&self, surface: &Topology, a: u32, b: u32) -> Option<Price> {
         match self.placement {
             Placement::Optimal => self.price_optimal(surface, a, b),
@@ -379,14 +396,13 @@ impl ErrorMetric for Its {
     fn contracted(&mut self, surface: &mut Topology, done: &Contraction) {
         self.merge(surface, done);
         if self.memoryless {
-            let mut neighbours = std::mem::take(&mut self.neighbours);
-            surface.neighbours(done.kept, &mut neighbours);
             surface.classify_edges(done.kept);
             self.gather(surface, done.kept);
-            for &vertex in &neighbours {
-                self.gather(surface, vertex);
+            // The others around have lost or changed two of their faces: enough to price them again, but not at once.
+            surface.neighbours(done.kept, &mut self.neighbours);
+            for &vertex in &self.neighbours {
+                self.stale[vertex as usize] = true;
             }
-            self.neighbours = neighbours;
         }
     }
 }

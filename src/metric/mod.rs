@@ -32,6 +32,9 @@ pub struct Price {
 
 /// Prices contractions and follows them.
 pub trait ErrorMetric {
+    /// The pair `a`, `b` is about to be priced for good: brings up to date what was put off.
+    fn prepare(&mut self, _surface: &Topology, _a: u32, _b: u32) {}
+
     /// What contracting `a` and `b` costs; `None` = refused.
     fn price(&self, surface: &Topology, a: u32, b: u32) -> Option<Price>;
 

@@ -171,6 +171,7 @@ impl<E: ErrorMetric> Driver<'_, E> {
             if now.contains(&GONE) || now[0].wrapping_add(now[1]) != tag {
                 continue;
             }
+            self.metric.prepare(self.surface, a, b);
             let Some(price) = self.price(a, b) else { continue };
             if !self.queue.is_due(price.cost) {
                 self.queue.push(a, b, price.cost, tag);

@@ -5,7 +5,7 @@
 //! custom attributes) is taken from the nearer end.
 
 use super::progressive::Progressive;
-use crate::mesh::layout::{AttributeScale, Field, FieldKind, Layout};
+use crate::mesh::layout::{Field, FieldKind, Layout};
 use crate::mesh::weld::{NONE, Weld, weld};
 use crate::mesh::{Attribute, ComponentType, LevelOwnVertices, Mesh, Primitive};
 use crate::quadric::{cross, dot, sub};
@@ -23,8 +23,8 @@ pub struct Welded {
 impl Welded {
     /// Welds `mesh` as the simplifier does.
     pub fn new(mesh: &Mesh) -> Self {
-        // Scales do not matter here: recorded values are unscaled.
-        let layout = Layout::new(mesh, AttributeScale { normal: 1.0, texcoord: 1.0, color: 1.0 });
+        // Recorded values are unscaled.
+        let layout = Layout::unscaled(mesh);
         let weld = weld(mesh, &layout);
         let mut positions = vec![[0.0; 3]; weld.vertices];
         for wedge in 0..weld.wedge_vertex.len() {
