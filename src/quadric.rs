@@ -76,7 +76,10 @@ impl Quadric {
 ///
 /// Near its origin nothing large cancels, so single precision is enough, and sums are a few vector additions. Row `i` is
 /// `(A_i0, A_i1, A_i2, b_i)`. Only component-wise operations: the same bits with and without vector registers.
+///
+/// A cache line each, in one line each.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(align(64))]
 pub struct Form {
     rows: [Vec4; 3],
     constant: f32,
@@ -101,6 +104,12 @@ impl Form {
         self.rows[0] += u * p.x + v * q.x;
         self.rows[1] += u * p.y + v * q.y;
         self.rows[2] += u * p.z + v * q.z;
+    }
+
+    /// The value at the origin.
+    #[inline]
+    pub fn constant(&self) -> f32 {
+        self.constant
     }
 
     /// Adds `other`, which must have the same origin.

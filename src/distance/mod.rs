@@ -27,7 +27,7 @@ const LEAF: usize = 8;
 
 impl Surface {
     /// Builds the hierarchy over triangles given by their corners.
-    pub fn new(triangles: Vec<[[f64; 3]; 3]>) -> Self {
+    pub fn new(triangles: &[[[f64; 3]; 3]]) -> Self {
         let mut items: Vec<Item> = triangles.iter().zip(0..).map(|(t, index)| Item::new(t, index)).collect();
         let mut nodes = Vec::with_capacity(triangles.len().div_ceil(LEAF) * 2);
         if !items.is_empty() {
@@ -225,7 +225,7 @@ mod tests {
 
     #[test]
     fn distances_to_a_square_are_the_closed_form() {
-        let surface = Surface::new(square(9));
+        let surface = Surface::new(&square(9));
         for (p, want) in [
             ([0.5, 0.5, 2.0], 2.0),
             ([0.31, 0.77, 0.0], 0.0),
@@ -248,7 +248,7 @@ mod tests {
         };
         let triangles: Vec<[[f64; 3]; 3]> =
             (0..300).map(|_| std::array::from_fn(|_| std::array::from_fn(|_| next()))).collect();
-        let surface = Surface::new(triangles.clone());
+        let surface = Surface::new(&triangles);
         for _ in 0..200 {
             let p = [next() * 3.0, next() * 3.0, next() * 3.0];
             let want = triangles.iter().map(|t| squared_distance_to_triangle(p, t)).fold(f64::INFINITY, f64::min);
@@ -258,10 +258,10 @@ mod tests {
 
     #[test]
     fn largest_distance_finds_the_one_far_point() {
-        let surface = Surface::new(square(4));
+        let surface = Surface::new(&square(4));
         let points = (0..100).map(|i| [0.5, 0.5, if i == 57 { 0.25 } else { 0.01 }]);
         assert!((largest_distance(points, &surface, 0.0) - 0.25).abs() < 1e-12);
         assert_eq!(largest_distance(std::iter::empty(), &surface, 0.125), 0.125);
-        assert_eq!(largest_distance(std::iter::once([0.0; 3]), &Surface::new(Vec::new()), 0.0), f64::INFINITY);
+        assert_eq!(largest_distance(std::iter::once([0.0; 3]), &Surface::new(&[]), 0.0), f64::INFINITY);
     }
 }

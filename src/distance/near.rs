@@ -171,7 +171,11 @@ impl Search<'_> {
         self.asked += 1;
         let mut triangles = self.sheet.triangles.iter().map(|&t| self.sheet.corners(t));
         if FEW_SEARCHES < self.asked || self.sheet.tree.get().is_some() {
-            return self.sheet.tree.get_or_init(|| Surface::new(triangles.collect())).squared_distance_above(p, enough);
+            return self
+                .sheet
+                .tree
+                .get_or_init(|| Surface::new(&triangles.collect::<Vec<_>>()))
+                .squared_distance_above(p, enough);
         }
         let mut nearest = f64::INFINITY;
         while enough < nearest
@@ -209,7 +213,7 @@ mod tests {
     fn the_result_is_that_of_searching_for_every_point() {
         let (positions, triangles) = sheet(20, 0.1);
         let sheet = Sheet::new(&positions, triangles.clone());
-        let tree = Surface::new(triangles.iter().map(|&t| sheet.corners(t)).collect());
+        let tree = Surface::new(&triangles.iter().map(|&t| sheet.corners(t)).collect::<Vec<_>>());
         let mut state = 7u64;
         let mut next = || {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);

@@ -16,10 +16,10 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 pub use jobs::{MeshParts, SequenceJob, write_chain};
 
 /// Encoding of cached results. Raise it when old bytes can no longer be read.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 
 /// Simplification and levels. Raise it in the commit that changes any bytes for the same mesh and settings.
-pub const ALGORITHM_VERSION: u32 = 1;
+pub const ALGORITHM_VERSION: u32 = 2;
 
 /// Form of the outputs. Raise it in the commit that writes the same levels in another way.
 pub const EMIT_VERSION: u32 = 2;

@@ -19,9 +19,9 @@ use glam::Vec4;
 
 use super::{ErrorMetric, Placement, Price};
 use crate::mesh::layout::MOST_COLUMNS;
-use crate::mesh::topology::{Contraction, Corner, EdgeKind, NEXT, PREVIOUS, Topology, WedgePairs};
+use crate::mesh::topology::{Contraction, EdgeKind, NEXT, PREVIOUS, Topology, WedgePairs};
 use crate::mesh::weld::NONE;
-use crate::quadric::{Form, cross, dot, dot3, scale, sub};
+use crate::quadric::{Form, cross, dot, dot3, lerp, scale, sub};
 
 /// Weights of the planes that hold edges in place, against the weight of a face's own plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +32,16 @@ pub struct EdgeWeights {
     pub seam: f64,
     /// Discontinuities of the normal alone.
     pub crease: f64,
+}
+
+/// What a face gives to each of its vertices.
+struct FaceTerms {
+    form: Form,
+    area: f32,
+    /// Unit normal.
+    unit: [f64; 3],
+    /// Not too thin for gradients.
+    has_fields: bool,
 }
 
 /// The metric.
@@ -49,6 +59,8 @@ pub struct Its {
     means: Vec<Vec4>,
     /// Their weights: areas.
     weights: Vec<f32>,
+    /// Gradients of one face, on their way to its wedges.
+    gradients: Vec<Vec4>,
     /// Vertices whose surroundings have changed since they were gathered; empty if not memoryless.
     stale: Vec<bool>,
     neighbours: Vec<u32>,
@@ -66,12 +78,11 @@ impl Its {
             forms: vec![Form::default(); surface.positions.len()],
             means: vec![Vec4::ZERO; wedges * surface.columns],
             weights: vec![0.0; wedges],
+            gradients: vec![Vec4::ZERO; surface.columns],
             stale: vec![false; if memoryless { surface.positions.len() } else { 0 }],
             neighbours: Vec::new(),
         };
-        for vertex in 0..surface.positions.len() as u32 {
-            out.gather(surface, vertex);
-        }
+        out.gather_all(surface);
         out
     }
 
@@ -85,16 +96,61 @@ impl Its {
         &mut self.means[wedge as usize * self.columns..][..self.columns]
     }
 
+    /// Builds the quadrics and mean fields of all vertices, each face once.
+    fn gather_all(&mut self, surface: &Topology) {
+        for (id, face) in surface.faces.iter().enumerate() {
+            let Some(terms) = self.face(surface, id) else { continue };
+            for (at, next) in NEXT.into_iter().enumerate() {
+                self.add_face(face.v[at], face.w[at], &terms);
+                if let Some((across, weight)) = self.edge_plane(surface, id, at, &terms) {
+                    self.forms[face.v[at] as usize].add_linear(across, weight);
+                    self.forms[face.v[next] as usize].add_linear(across, weight);
+                }
+            }
+        }
+        for vertex in 0..surface.positions.len() as u32 {
+            self.average(surface, vertex);
+        }
+    }
+
     /// Builds the quadric of `vertex` and the mean fields of its wedges from the faces as they are.
     fn gather(&mut self, surface: &Topology, vertex: u32) {
-        let mut form = Form::default();
+        self.forms[vertex as usize] = Form::default();
         for wedge in surface.wedges(vertex) {
             self.mean_mut(wedge).fill(Vec4::ZERO);
             self.weights[wedge as usize] = 0.0;
         }
         for &corner in surface.ring(vertex) {
-            self.gather_face(surface, corner, &mut form);
+            let Some(terms) = self.face(surface, corner.face()) else { continue };
+            self.add_face(vertex, surface.faces[corner.face()].w[corner.at()], &terms);
+            for edge in [corner.at(), PREVIOUS[corner.at()]] {
+                if let Some((across, weight)) = self.edge_plane(surface, corner.face(), edge, &terms) {
+                    self.forms[vertex as usize].add_linear(across, weight);
+                }
+            }
         }
+        self.average(surface, vertex);
+        if self.memoryless {
+            self.stale[vertex as usize] = false;
+        }
+    }
+
+    /// Adds a face to one of its vertices.
+    #[inline]
+    fn add_face(&mut self, vertex: u32, wedge: u32, terms: &FaceTerms) {
+        self.forms[vertex as usize].add(&terms.form);
+        if terms.has_fields {
+            self.weights[wedge as usize] += terms.area;
+            for (mean, gradient) in self.means[wedge as usize * self.columns..].iter_mut().zip(&self.gradients) {
+                *mean += *gradient;
+            }
+        }
+    }
+
+    /// Sums to means: the spread of the fields around their mean is what is left in the vertex's quadric.
+    #[inline]
+    fn average(&mut self, surface: &Topology, vertex: u32) {
+        let mut form = self.forms[vertex as usize];
         for wedge in surface.wedges(vertex) {
             let weight = self.weights[wedge as usize];
             let inverse = if weight > 0.0 { 1.0 / weight } else { 0.0 };
@@ -107,65 +163,62 @@ impl Its {
             }
         }
         self.forms[vertex as usize] = form;
-        if self.memoryless {
-            self.stale[vertex as usize] = false;
-        }
     }
 
-    /// Adds what the face of one corner gives to the corner's vertex and wedge. Gradients are summed, not yet averaged.
+    /// What a face gives to each of its vertices; its gradients, by area, go to `self.gradients`. `None`: no area.
     #[inline]
-    fn gather_face(&mut self, surface: &Topology, corner: Corner, form: &mut Form) {
-        let (face, at) = (&surface.faces[corner.face()], corner.at());
-        let (i, j) = (NEXT[at], PREVIOUS[at]);
-        let here = surface.positions[face.v[at] as usize];
-        let e1 = sub(surface.positions[face.v[i] as usize], here);
-        let e2 = sub(surface.positions[face.v[j] as usize], here);
+    fn face(&mut self, surface: &Topology, id: usize) -> Option<FaceTerms> {
+        let face = &surface.faces[id];
+        let here = surface.positions[face.v[0] as usize];
+        let e1 = sub(surface.positions[face.v[1] as usize], here);
+        let e2 = sub(surface.positions[face.v[2] as usize], here);
         let normal = cross(e1, e2);
         let squared = dot(normal, normal);
         let inverse = 1.0 / squared;
         if !inverse.is_finite() {
-            return;
+            return None;
         }
         let length = squared.sqrt();
         let area = (0.5 * length) as f32;
-        // The plane through the vertex, by area.
-        form.add_linear(narrow(scale(normal, 1.0 / length)), area);
+        let unit = scale(normal, 1.0 / length);
+        let mut form = Form::default();
+        // The plane, by area. It goes through all three vertices, and so do the fields through their values.
+        form.add_linear(narrow(unit), area);
         // A face thinner than this has next to no area, and its gradients are noise.
-        if dot(e1, e1).max(dot(e2, e2)) * inverse < THINNEST {
+        let has_fields = dot(e1, e1).max(dot(e2, e2)) * inverse < THINNEST;
+        if has_fields {
             // Dual basis of the edges in the face's plane: gradient = d1·b1 + d2·b2.
             let b1 = narrow(scale(cross(e2, normal), inverse));
             let b2 = narrow(scale(cross(normal, e1), inverse));
-            let wedge = face.w[at];
-            let values = surface.value(wedge).iter().zip(surface.value(face.w[i])).zip(surface.value(face.w[j]));
+            let (area1, area2) = (b1 * area, b2 * area);
+            let [s0, s1, s2] = face.w.map(|w| surface.value(w));
             let mut sums = [0.0f32; 3];
-            for (mean, ((&s0, &s1), &s2)) in self.means[wedge as usize * self.columns..].iter_mut().zip(values) {
+            for (((gradient, &s0), &s1), &s2) in self.gradients.iter_mut().zip(s0).zip(s1).zip(s2) {
                 let (d1, d2) = (s1 - s0, s2 - s0);
                 sums[0] += d1 * d1;
                 sums[1] += d1 * d2;
                 sums[2] += d2 * d2;
-                *mean += b1 * (area * d1) + b2 * (area * d2);
+                *gradient = area1 * d1 + area2 * d2;
             }
             form.add_plane_form(b1, b2, sums, area);
-            self.weights[wedge as usize] += area;
         }
-        let kinds = surface.kinds[corner.face()];
-        for (edge, along) in [(at, e1), (j, e2)] {
-            let weight = match kinds[edge] {
-                EdgeKind::Interior => continue,
-                EdgeKind::Crease => self.edges.crease,
-                EdgeKind::Seam => self.edges.seam,
-                EdgeKind::Border => self.edges.border,
-            };
-            // The plane through the edge, perpendicular to the face, weighted by the squared length of the edge.
-            let across = cross(normal, along);
-            let across_squared = dot(across, across);
-            if weight > 0.0 && across_squared > 0.0 {
-                form.add_linear(
-                    narrow(scale(across, 1.0 / across_squared.sqrt())),
-                    (weight * dot(along, along)) as f32,
-                );
-            }
-        }
+        Some(FaceTerms { form, area, unit, has_fields })
+    }
+
+    /// The plane through an edge that is not inside the surface, perpendicular to the face, weighted by the squared
+    /// length of the edge.
+    #[inline]
+    fn edge_plane(&self, surface: &Topology, id: usize, edge: usize, terms: &FaceTerms) -> Option<(Vec4, f32)> {
+        let weight = match surface.kinds[id][edge] {
+            EdgeKind::Interior => return None,
+            EdgeKind::Crease => self.edges.crease,
+            EdgeKind::Seam => self.edges.seam,
+            EdgeKind::Border => self.edges.border,
+        };
+        let v = &surface.faces[id].v;
+        let along = sub(surface.positions[v[NEXT[edge]] as usize], surface.positions[v[edge] as usize]);
+        // As long as the edge.
+        (weight > 0.0).then(|| (narrow(cross(terms.unit, along)), weight as f32))
     }
 
     /// The quadric of a pair with every attribute at its best, around the position of `a`.
@@ -201,11 +254,14 @@ impl Its {
             return;
         }
         let weight = va * vb / sum;
+        // A copy, which stays in registers.
+        let mut sum = *form;
         for (&f, &g) in self.mean(wa).iter().zip(self.mean(wb)) {
             let mut apart = f - g;
             apart.w -= dot3(g, back);
-            form.add_linear(apart, weight);
+            sum.add_linear(apart, weight);
         }
+        *form = sum;
     }
 
     /// As [`Self::add_spread`] for all classes of wedges that `pairs` join, directly or through each other.
@@ -258,22 +314,21 @@ impl Its {
         let (pa, pb) = (surface.positions[a as usize], surface.positions[b as usize]);
         let along = sub(pb, pa);
         let middle = scale(along, 0.5);
-        let solved = whole.minimum(middle).filter(|&x| near(x, along));
-        let mut best = (f64::INFINITY, middle);
         // The solution is the least there is, but for the pull towards the middle, which decides nothing else.
-        let places = [solved, Some(middle), Some([0.0; 3]), Some(along)];
-        for x in places.into_iter().flatten().take(if solved.is_some() { 1 } else { 4 }) {
+        if let Some(x) = whole.minimum(middle)
+            && near(x, along)
+        {
+            let position = [pa[0] + x[0], pa[1] + x[1], pa[2] + x[2]];
+            return Some(Price { cost: whole.eval(x).max(0.0), position, keep_second: false });
+        }
+        let mut best = (whole.eval(middle), lerp(pa, pb, 0.5));
+        for (x, position) in [([0.0; 3], pa), (along, pb)] {
             let cost = whole.eval(x);
             if cost < best.0 {
-                best = (cost, x);
+                best = (cost, position);
             }
         }
-        let position = match best.1 {
-            x if x == [0.0; 3] => pa,
-            x if x == along => pb,
-            x => [pa[0] + x[0], pa[1] + x[1], pa[2] + x[2]],
-        };
-        Some(Price { cost: best.0.max(0.0), position, keep_second: false })
+        Some(Price { cost: best.0.max(0.0), position: best.1, keep_second: false })
     }
 
     /// Cost of merging `gone` into `kept` with everything at `kept` as it is; `None` if a wedge of `gone` has no one
@@ -369,6 +424,17 @@ impl ErrorMetric for Its {
                 }
             }
         }
+    }
+
+    #[inline]
+    fn touch(&self, surface: &Topology, vertices: impl Iterator<Item = u32>) {
+        let mut sum = 0.0;
+        for vertex in vertices {
+            let at = (surface.first_wedge(vertex) as usize).wrapping_mul(self.columns);
+            let ends = [self.means.get(at), self.means.get((at + self.columns).wrapping_sub(1))];
+            sum += self.forms[vertex as usize].constant() + ends.into_iter().flatten().map(|mean| mean.w).sum::<f32>();
+        }
+        std::hint::black_box(sum);
     }
 
     #[inline]

@@ -35,6 +35,10 @@ pub trait ErrorMetric {
     /// The pair `a`, `b` is about to be priced for good: brings up to date what was put off.
     fn prepare(&mut self, _surface: &Topology, _a: u32, _b: u32) {}
 
+    /// Pairs of these vertices will be priced soon. Reads what that needs, all at once: a machine waits for many places in
+    /// memory no longer than for one. Changes nothing.
+    fn touch(&self, _surface: &Topology, _vertices: impl Iterator<Item = u32>) {}
+
     /// What contracting `a` and `b` costs; `None` = refused.
     fn price(&self, surface: &Topology, a: u32, b: u32) -> Option<Price>;
 

@@ -48,7 +48,7 @@ impl Qem {
         q
     }
 
-    fn price_subset(&self, surface: &Topology, a: u32, b: u32, q: &Quadric) -> Option<Price> {
+    fn price_subset(surface: &Topology, a: u32, b: u32, q: &Quadric) -> Option<Price> {
         let (pa, pb) = (surface.positions[a as usize], surface.positions[b as usize]);
         let (first, second) = (q.eval(pa), q.eval(pb));
         let first_fits = wedges_fit(surface, a, b);
@@ -64,7 +64,7 @@ impl ErrorMetric for Qem {
     fn price(&self, surface: &Topology, a: u32, b: u32) -> Option<Price> {
         let q = self.combined(a, b);
         if self.placement == Placement::Subset {
-            return self.price_subset(surface, a, b, &q);
+            return Self::price_subset(surface, a, b, &q);
         }
         let (pa, pb) = (surface.positions[a as usize], surface.positions[b as usize]);
         let middle = lerp(pa, pb, 0.5);

@@ -129,6 +129,9 @@ struct Driver<'a, E> {
 /// Stamp of a vertex that is gone.
 const GONE: u32 = u32::MAX;
 
+/// Pairs whose surroundings are read before their turn.
+const AHEAD: usize = 8;
+
 impl<E: ErrorMetric> Driver<'_, E> {
     fn price(&self, a: u32, b: u32) -> Option<Price> {
         let mut price = self.locks.price(&self.metric, self.surface, a, b)?;
@@ -166,7 +169,13 @@ impl<E: ErrorMetric> Driver<'_, E> {
         // Ends of pairs that were illegal when their turn came: tried again when something beside them changes.
         let mut refused = vec![false; vertices];
         let (mut neighbours, mut second) = (Vec::new(), Vec::new());
+        let mut until_touch = 0;
         while let Some(Entry { a, b, tag }) = self.queue.pop() {
+            if until_touch == 0 {
+                self.touch_ahead(&stamps);
+                until_touch = AHEAD;
+            }
+            until_touch -= 1;
             let now = [stamps[a as usize], stamps[b as usize]];
             if now.contains(&GONE) || now[0].wrapping_add(now[1]) != tag {
                 continue;
@@ -200,7 +209,17 @@ impl<E: ErrorMetric> Driver<'_, E> {
         }
     }
 
+    /// Reads what the next pairs need, all at once.
+    fn touch_ahead(&self, stamps: &[u32]) {
+        let current = |e: &&Entry| stamps[e.a as usize].wrapping_add(stamps[e.b as usize]) == e.tag;
+        let ahead = self.queue.ahead(AHEAD).iter().filter(current);
+        self.metric.touch(self.surface, ahead.clone().flat_map(|entry| [entry.a, entry.b]));
+        let here = |v: u32| self.surface.positions[v as usize][0] + self.surface.ring(v).len() as f64;
+        std::hint::black_box(ahead.map(|entry| here(entry.a) + here(entry.b)).sum::<f64>());
+    }
+
     fn push_all(&mut self, stamps: &[u32], vertex: u32, others: &[u32]) {
+        self.metric.touch(self.surface, others.iter().copied());
         for &other in others {
             if let Some(price) = self.locks.price(&self.metric, self.surface, vertex, other) {
                 let tag = stamps[vertex as usize].wrapping_add(stamps[other as usize]);

@@ -70,6 +70,13 @@ impl Queue {
         }
     }
 
+    /// The pairs that come after the next ones if nothing cheaper is added: `count` of them, or fewer.
+    #[inline]
+    pub fn ahead(&self, count: usize) -> &[Entry] {
+        let bin = &self.bins[self.open];
+        &bin.entries[bin.done..(bin.done + count).min(bin.entries.len())]
+    }
+
     /// Whether a pair of that cost need not wait.
     #[inline]
     pub fn is_due(&self, cost: f64) -> bool {
