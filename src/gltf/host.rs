@@ -1,8 +1,8 @@
 //! Which buffer of a `.gltf` must hold the levels too.
 //!
 //! Babylon.js asks for a buffer where it first meets it. Inside a finer level that is put off until all else has arrived;
-//! so, if an animation or a mesh without levels needs the same buffer, each waits for the other and the scene never
-//! loads. The cure: levels behind the source's bytes in that buffer, which the coarsest level asks for at once. (In a
+//! so, if an animation, a skin, an image or a mesh without levels needs the same buffer, each waits for the other and the
+//! scene never loads. The cure: levels behind the source's bytes in that buffer, which the coarsest level asks for at once. (In a
 //! GLB all bytes are in one chunk, and nothing waits.) Knows nothing of bytes.
 
 use super::document::{Container, Document};
@@ -24,27 +24,25 @@ pub(super) fn find(document: &Document, anchors: &BTreeSet<usize>) -> Result<Opt
         skins: document.array("skins")?,
     };
     let nodes = document.array("nodes")?;
-    let (mut put_off, mut needed, mut at_once) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
+    let (mut put_off, mut needed) = (BTreeSet::new(), BTreeSet::new());
     for (i, node) in nodes.iter().enumerate() {
         let meshes = index(node, "mesh").and_then(|mesh| finder.meshes.get(mesh));
         let skin = index(node, "skin").and_then(|skin| finder.skins.get(skin));
         let of_mesh = meshes.map_or_else(BTreeSet::new, |mesh| finder.mesh(mesh));
-        let of_skin = skin.and_then(|skin| finder.accessor(index(skin, "inverseBindMatrices")));
-        if anchors.contains(&i) {
-            put_off.extend(of_mesh);
-            at_once.extend(of_skin);
-        } else {
-            needed.extend(of_mesh);
-            needed.extend(of_skin);
-        }
+        if anchors.contains(&i) { put_off.extend(of_mesh) } else { needed.extend(of_mesh) }
+        needed.extend(skin.and_then(|skin| finder.accessor(index(skin, "inverseBindMatrices"))));
     }
     for animation in document.array("animations")? {
         for sampler in animation.get("samplers").and_then(Value::as_array).into_iter().flatten() {
             needed.extend(["input", "output"].iter().filter_map(|key| finder.accessor(index(sampler, key))));
         }
     }
+    for image in document.array("images")? {
+        let view = index(image, "bufferView").and_then(|view| finder.views.get(view));
+        needed.extend(view.and_then(|view| index(view, "buffer")));
+    }
     let buffers = document.array("buffers")?.len();
-    Ok(put_off.intersection(&needed).copied().find(|buffer| !at_once.contains(buffer) && *buffer < buffers))
+    Ok(put_off.intersection(&needed).copied().find(|buffer| *buffer < buffers))
 }
 
 fn index(value: &Value, key: &str) -> Option<usize> {
@@ -129,11 +127,14 @@ mod tests {
     }
 
     #[test]
-    fn a_skin_asks_for_its_buffer_at_once() {
+    fn skins_and_images_need_their_buffers_too() {
         let mut skinned = document();
-        skinned.json["bufferViews"][2]["buffer"] = json!(1);
         skinned.json["skins"] = json!([{ "joints": [0], "inverseBindMatrices": 1 }]);
-        skinned.json["nodes"][1]["skin"] = json!(0);
-        assert_eq!(host(&skinned, &[0, 1]), None);
+        assert_eq!(host(&skinned, &[0, 1]), None, "no node has the skin");
+        skinned.json["nodes"][0]["skin"] = json!(0);
+        assert_eq!(host(&skinned, &[0, 1]), Some(1));
+        let mut painted = document();
+        painted.json["images"] = json!([{ "bufferView": 0 }]);
+        assert_eq!(host(&painted, &[0, 1]), Some(0));
     }
 }
