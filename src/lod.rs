@@ -6,10 +6,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::allocate::Allocation;
-use crate::distance::{Surface, largest_distance};
+use crate::distance::near::Sheet;
 use crate::mesh::{Attribute, Level, LevelPrimitive, LevelVertices, Mesh, Primitive};
 use crate::simplify::progressive::Progressive;
-use crate::simplify::replay::{CutPrimitive, Replay};
+use crate::simplify::replay::{CutPrimitive, Replay, Welded};
 
 /// How coarse a level is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -109,7 +109,12 @@ pub fn chain(parts: &[Part], settings: &ChainSettings, judge: Option<Judge>) -> 
     let source: usize = parts.iter().map(|p| p.mesh.triangles()).sum();
     let radius = crate::mesh::layout::frame(parts.iter().flat_map(|p| &p.mesh.primitives)).1;
     let allocation = Allocation::new(&sequences);
-    let mut cutters: Vec<Cutter> = parts.iter().filter_map(|p| Some(Cutter::new(p, p.sequence?, settings))).collect();
+    let welded: Vec<Option<Welded>> = parts.iter().map(|p| p.sequence.map(|_| Welded::new(p.mesh))).collect();
+    let mut cutters: Vec<Cutter> = parts
+        .iter()
+        .zip(&welded)
+        .filter_map(|(part, welded)| Some(Cutter::new(part, welded.as_ref()?, part.sequence?, settings)))
+        .collect();
     let mut chain = Chain { levels: Vec::new() };
     let mut triangles_before = source;
     for (number, &target) in settings.targets.iter().enumerate() {
@@ -219,28 +224,24 @@ fn keep_something(sequences: &[&Progressive], mut cuts: Vec<usize>, fixed: usize
 /// One sub-mesh on its way down.
 struct Cutter<'a> {
     part: Part<'a>,
+    welded: &'a Welded,
     sequence: &'a Progressive,
     settings: &'a ChainSettings,
     replay: Replay<'a>,
     done: usize,
-    source: Surface,
-    radius: f64,
+    source: Source<'a>,
 }
 
 impl<'a> Cutter<'a> {
-    fn new(part: &Part<'a>, sequence: &'a Progressive, settings: &'a ChainSettings) -> Self {
-        let triangles = part.mesh.primitives.iter().flat_map(|p| {
-            let positions = p.positions();
-            p.indices.chunks_exact(3).map(move |t| [0, 1, 2].map(|i| positions[t[i] as usize].map(f64::from)))
-        });
+    fn new(part: &Part<'a>, welded: &'a Welded, sequence: &'a Progressive, settings: &'a ChainSettings) -> Self {
         Self {
             part: *part,
+            welded,
             sequence,
             settings,
-            replay: Replay::new(part.mesh, sequence),
+            replay: Replay::new(part.mesh, welded, sequence),
             done: 0,
-            source: Surface::new(triangles.collect()),
-            radius: crate::mesh::layout::frame(&part.mesh.primitives).1,
+            source: Source::new(part.mesh, welded),
         }
     }
 
@@ -248,7 +249,7 @@ impl<'a> Cutter<'a> {
     /// halves finds a cut whose successor (at the search's resolution) is over it.
     fn cut_within(&self, target: Target) -> usize {
         let limit = match target {
-            Target::ErrorOfRadius(fraction) => fraction * self.radius,
+            Target::ErrorOfRadius(fraction) => fraction * self.source.radius,
             Target::Error(limit) => limit,
             Target::Ratio(_) | Target::Triangles(_) | Target::ErrorOfMesh(_) | Target::Appearance(_) => return 0,
         };
@@ -257,11 +258,14 @@ impl<'a> Cutter<'a> {
         let resolution = (self.sequence.steps.len() / 1000).max(1);
         while resolution < over - within {
             let middle = within + (over - within) / 2;
-            let mut replay = Replay::new(self.part.mesh, self.sequence);
+            let mut replay = Replay::new(self.part.mesh, self.welded, self.sequence);
             replay.advance(middle.min(self.sequence.steps.len()));
             let cut = replay.primitives();
-            let error =
-                if cut.iter().all(|c| c.indices.is_empty()) { f64::INFINITY } else { self.error(&mut replay, &cut) };
+            let error = if cut.iter().all(|c| c.indices.is_empty()) {
+                f64::INFINITY
+            } else {
+                self.source.deviation(&mut replay, &cut)
+            };
             if error <= limit {
                 within = middle;
             } else {
@@ -274,7 +278,7 @@ impl<'a> Cutter<'a> {
     fn level(&mut self, cut: usize, finish: Finish) -> Level {
         if cut < self.done {
             // A later target asked for a finer cut of this part: start again.
-            self.replay = Replay::new(self.part.mesh, self.sequence);
+            self.replay = Replay::new(self.part.mesh, self.welded, self.sequence);
         }
         self.done = cut;
         self.replay.advance(cut);
@@ -282,15 +286,11 @@ impl<'a> Cutter<'a> {
         let sources = &self.part.mesh.primitives;
         let error = match finish {
             Finish::Draft => 0.0,
-            Finish::Whole => measured(&self.source, self.part.mesh, &mut self.replay, &cuts),
+            Finish::Whole => self.source.deviation(&mut self.replay, &cuts),
         };
         let primitive = |(index, cut)| self.primitive(index, &sources[index], cut, finish);
         let primitives = cuts.into_iter().enumerate().map(primitive).collect();
         Level { primitives, error }
-    }
-
-    fn error(&self, replay: &mut Replay, cuts: &[CutPrimitive]) -> f64 {
-        measured(&self.source, self.part.mesh, replay, cuts)
     }
 
     fn primitive(&self, index: usize, source: &Primitive, mut cut: CutPrimitive, finish: Finish) -> LevelPrimitive {
@@ -345,34 +345,41 @@ fn order_by_use(cut: &mut CutPrimitive) {
 /// Points measured in each direction: beyond this many a further one hardly ever raises the maximum.
 const MOST_SAMPLES: usize = 16384;
 
-/// Largest distance between source and level: from source vertices to the level, and from the level's corners and
-/// middles of triangles to the source.
-fn measured(source: &Surface, mesh: &Mesh, replay: &mut Replay, cuts: &[CutPrimitive]) -> f64 {
-    let corners = |cut: &CutPrimitive, t: &[u32]| {
-        [0, 1, 2].map(|i| replay.wedge_position(cut.wedges[t[i] as usize]).map(f64::from))
-    };
-    let triangles: Vec<[[f64; 3]; 3]> =
-        cuts.iter().flat_map(|cut| cut.indices.chunks_exact(3).map(move |t| corners(cut, t))).collect();
-    let middles = triangles.iter().map(|t| [0, 1, 2].map(|i| (t[0][i] + t[1][i] + t[2][i]) / 3.0));
-    let points = middles.chain(triangles.iter().map(|t| t[0]));
-    let back = largest_distance(thinned(points, triangles.len() * 2), source, 0.0);
-    if triangles.is_empty() {
-        // Nothing is left of it: as far off as it was large.
-        return 2.0 * crate::mesh::layout::frame(&mesh.primitives).1;
+/// A source that levels are measured against. Both are surfaces over the source's vertices.
+#[derive(Debug)]
+pub struct Source<'a> {
+    sheet: Sheet<'a>,
+    radius: f64,
+}
+
+impl<'a> Source<'a> {
+    /// The surface of `mesh`, which must be what `welded` was made from.
+    pub fn new(mesh: &Mesh, welded: &'a Welded) -> Self {
+        let radius = crate::mesh::layout::frame(&mesh.primitives).1;
+        Self { sheet: Sheet::new(&welded.positions, welded.triangles(mesh)), radius }
     }
-    let level = Surface::new(triangles.clone());
-    let total = mesh.vertices();
-    let vertices = mesh.primitives.iter().flat_map(used_positions);
-    largest_distance(thinned(vertices, total), &level, back)
-}
 
-fn used_positions(primitive: &Primitive) -> impl Iterator<Item = [f64; 3]> + '_ {
-    let mut used = vec![false; primitive.count];
-    primitive.indices.iter().for_each(|&i| used[i as usize] = true);
-    let positions = primitive.positions();
-    used.into_iter().zip(positions).filter(|(used, _)| *used).map(|(_, p)| p.map(f64::from))
-}
-
-fn thinned(points: impl Iterator<Item = [f64; 3]>, count: usize) -> impl Iterator<Item = [f64; 3]> {
-    points.step_by(count.div_ceil(MOST_SAMPLES).max(1))
+    /// Largest distance between source and level: from source vertices to the level, and from the level's corners and
+    /// middles of triangles to the source.
+    pub fn deviation(&self, replay: &mut Replay, cuts: &[CutPrimitive]) -> f64 {
+        let triangles: Vec<[u32; 3]> = cuts.iter().flat_map(|cut| replay.triangles(cut)).collect();
+        if triangles.is_empty() {
+            // Nothing is left of it: as far off as it was large.
+            return 2.0 * self.radius;
+        }
+        let roots = replay.roots();
+        let level = Sheet::new(replay.positions(), triangles);
+        let middle = |t: [u32; 3]| {
+            let p = level.corners(t);
+            [0, 1, 2].map(|i| (p[0][i] + p[1][i] + p[2][i]) / 3.0)
+        };
+        // A vertex that is left has kept its number.
+        let middles = level.triangles().iter().map(|&t| (middle(t), t[0]));
+        let corners = level.triangles().iter().map(|&t| (level.position(t[0]), t[0]));
+        let step = (level.triangles().len() * 2).div_ceil(MOST_SAMPLES).max(1);
+        let back = self.sheet.largest_distance(middles.chain(corners).step_by(step), 0.0);
+        let step = roots.len().div_ceil(MOST_SAMPLES).max(1);
+        let vertices = roots.iter().zip(0..).map(|(&root, vertex)| (self.sheet.position(vertex), root));
+        level.largest_distance(vertices.step_by(step), back)
+    }
 }

@@ -3,6 +3,8 @@
 //! Knows nothing of meshes. M. Garland, P. Heckbert, *Surface simplification using quadric error metrics*, 1997;
 //! H. Hoppe, *New quadric metric for simplifying meshes with appearance attributes*, 1999 (gradient form).
 
+use glam::Vec4;
+
 /// `q(p) = pᵀA p + 2 b·p + c`, with `A` symmetric.
 ///
 /// Coefficients in the order `xx xy xz yy yz zz  bx by bz  c`: one flat array, so that sums become vector additions.
@@ -70,143 +72,80 @@ impl Quadric {
     }
 }
 
-/// Squared error of `M` linear attribute fields: `Σ_f a_f Σ_j (g_fj·p + d_fj − s_j)²`, kept so that the best values
-/// `s` at any point follow in O(M).
+/// A quadric around a place of its own, its origin: `q(x) = xᵀA x + 2 b·x + c` for the offset `x` from there.
 ///
-/// Gradient sums are stored by axis (`gx[j]`, `gy[j]`, `gz[j]`), so that loops over `j` run over flat arrays.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FieldQuadric<const M: usize> {
-    /// The part that depends on the point alone: `Σ a (g·p + d)²` over faces and fields.
-    pub point: Quadric,
-    /// `Σ a g_x` for each field.
-    pub gx: [f64; M],
-    /// `Σ a g_y` for each field.
-    pub gy: [f64; M],
-    /// `Σ a g_z` for each field.
-    pub gz: [f64; M],
-    /// `Σ a d` for each field.
-    pub d: [f64; M],
-    /// `Σ a`: sum of the weights (areas).
-    pub weight: f64,
+/// Near its origin nothing large cancels, so single precision is enough, and sums are a few vector additions. Row `i` is
+/// `(A_i0, A_i1, A_i2, b_i)`. Only component-wise operations: the same bits with and without vector registers.
+///
+/// A cache line each, in one line each.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(align(64))]
+pub struct Form {
+    rows: [Vec4; 3],
+    constant: f32,
 }
 
-impl<const M: usize> Default for FieldQuadric<M> {
-    fn default() -> Self {
-        Self { point: Quadric::default(), gx: [0.0; M], gy: [0.0; M], gz: [0.0; M], d: [0.0; M], weight: 0.0 }
-    }
-}
-
-#[expect(clippy::needless_range_loop, reason = "one index runs over several flat arrays")]
-impl<const M: usize> FieldQuadric<M> {
-    /// Of one triangle: the fields take the values `s` at its corners `p` and are linear between them.
-    /// `normal` is the cross product of the edges (twice the area long), `weight` the triangle's weight.
+impl Form {
+    /// Adds `weight · (v.xyz·x + v.w)²`.
     #[inline]
-    pub fn triangle(p: &[[f64; 3]; 3], s: [&[f64]; 3], normal: [f64; 3], weight: f64) -> Self {
-        let mut out = Self::default();
-        let squared = dot(normal, normal);
-        if M == 0 || squared <= 0.0 || weight <= 0.0 {
-            return out;
+    pub fn add_linear(&mut self, v: Vec4, weight: f32) {
+        let weighted = v * weight;
+        self.rows[0] += v * weighted.x;
+        self.rows[1] += v * weighted.y;
+        self.rows[2] += v * weighted.z;
+        self.constant += v.w * weighted.w;
+    }
+
+    /// Adds `weight · (s11 (u·x)² + 2 s12 (u·x)(v·x) + s22 (v·x)²)`; `u.w` and `v.w` must be 0.
+    #[inline]
+    pub fn add_plane_form(&mut self, u: Vec4, v: Vec4, [s11, s12, s22]: [f32; 3], weight: f32) {
+        let p = u * (s11 * weight) + v * (s12 * weight);
+        let q = u * (s12 * weight) + v * (s22 * weight);
+        self.rows[0] += u * p.x + v * q.x;
+        self.rows[1] += u * p.y + v * q.y;
+        self.rows[2] += u * p.z + v * q.z;
+    }
+
+    /// The value at the origin.
+    #[inline]
+    pub fn constant(&self) -> f32 {
+        self.constant
+    }
+
+    /// Adds `other`, which must have the same origin.
+    #[inline]
+    pub fn add(&mut self, other: &Self) {
+        for (a, b) in self.rows.iter_mut().zip(other.rows) {
+            *a += b;
         }
-        // Dual basis of the edges in the triangle's plane: gradient = ds1·b1 + ds2·b2.
-        let inverse = 1.0 / squared;
-        if !inverse.is_finite() {
-            return out;
-        }
-        let b1 = scale(cross(sub(p[2], p[0]), normal), inverse);
-        let b2 = scale(cross(normal, sub(p[1], p[0])), inverse);
-        let mut sums = [0.0; 10];
-        for j in 0..M {
-            let (s0, d1, d2) = (s[0][j], s[1][j] - s[0][j], s[2][j] - s[0][j]);
-            let x = d1 * b1[0] + d2 * b2[0];
-            let y = d1 * b1[1] + d2 * b2[1];
-            let z = d1 * b1[2] + d2 * b2[2];
-            let d = s0 - (x * p[0][0] + y * p[0][1] + z * p[0][2]);
-            out.gx[j] = weight * x;
-            out.gy[j] = weight * y;
-            out.gz[j] = weight * z;
-            out.d[j] = weight * d;
-            sums[0] += x * x;
-            sums[1] += x * y;
-            sums[2] += x * z;
-            sums[3] += y * y;
-            sums[4] += y * z;
-            sums[5] += z * z;
-            sums[6] += x * d;
-            sums[7] += y * d;
-            sums[8] += z * d;
-            sums[9] += d * d;
-        }
-        for (q, sum) in out.point.0.iter_mut().zip(sums) {
-            *q = weight * sum;
-        }
-        out.weight = weight;
+        self.constant += other.constant;
+    }
+
+    /// The same quadric around `origin + by`.
+    #[inline]
+    pub fn moved(&self, by: [f32; 3]) -> Self {
+        // A by, and b·by as the fourth.
+        let step = self.rows[0] * by[0] + self.rows[1] * by[1] + self.rows[2] * by[2];
+        let mut out = *self;
+        out.rows[0].w += step.x;
+        out.rows[1].w += step.y;
+        out.rows[2].w += step.z;
+        out.constant += 2.0 * step.w + (step.x * by[0] + step.y * by[1] + step.z * by[2]);
         out
     }
 
-    /// Adds `other`.
+    /// The same in double precision, around the point `origin`.
     #[inline]
-    pub fn add(&mut self, other: &Self) {
-        self.point.add(&other.point);
-        for j in 0..M {
-            self.gx[j] += other.gx[j];
-            self.gy[j] += other.gy[j];
-            self.gz[j] += other.gz[j];
-            self.d[j] += other.d[j];
-        }
-        self.weight += other.weight;
+    pub fn widen(&self) -> Quadric {
+        let [x, y, z] = self.rows;
+        Quadric([x.x, x.y, x.z, y.y, y.z, z.z, x.w, y.w, z.w, self.constant].map(f64::from))
     }
+}
 
-    /// Adds to `to` the quadric over the point alone that remains when every field takes its best value there
-    /// (Schur complement).
-    #[inline]
-    pub fn reduce_into(&self, to: &mut Quadric) {
-        if self.weight <= 0.0 {
-            return;
-        }
-        let inverse = 1.0 / self.weight;
-        let mut sums = [0.0; 10];
-        for j in 0..M {
-            let (x, y, z, d) = (self.gx[j], self.gy[j], self.gz[j], self.d[j]);
-            sums[0] += x * x;
-            sums[1] += x * y;
-            sums[2] += x * z;
-            sums[3] += y * y;
-            sums[4] += y * z;
-            sums[5] += z * z;
-            sums[6] += x * d;
-            sums[7] += y * d;
-            sums[8] += z * d;
-            sums[9] += d * d;
-        }
-        for ((q, point), sum) in to.0.iter_mut().zip(self.point.0).zip(sums) {
-            *q += point - sum * inverse;
-        }
-    }
-
-    /// The best field values at `p`; `None` if no face has weight.
-    #[inline]
-    pub fn solve(&self, p: [f64; 3]) -> Option<[f64; M]> {
-        if self.weight <= 0.0 {
-            return None;
-        }
-        let inverse = 1.0 / self.weight;
-        let mut out = [0.0; M];
-        for (j, s) in out.iter_mut().enumerate() {
-            *s = (self.gx[j] * p[0] + self.gy[j] * p[1] + self.gz[j] * p[2] + self.d[j]) * inverse;
-        }
-        Some(out)
-    }
-
-    /// The error at `p` when the fields are held at `s`.
-    #[inline]
-    pub fn eval_fixed(&self, p: [f64; 3], s: &[f64]) -> f64 {
-        let mut sum = self.point.eval(p);
-        for j in 0..M {
-            let at = self.gx[j] * p[0] + self.gy[j] * p[1] + self.gz[j] * p[2] + self.d[j];
-            sum += s[j] * (self.weight * s[j] - 2.0 * at);
-        }
-        sum
-    }
+/// Scalar product of the first three components.
+#[inline]
+pub fn dot3(v: Vec4, x: [f32; 3]) -> f32 {
+    v.x * x[0] + v.y * x[1] + v.z * x[2]
 }
 
 /// `a − b`
@@ -270,22 +209,23 @@ mod tests {
     }
 
     #[test]
-    fn a_linear_field_costs_nothing_and_is_solved_exactly() {
-        // Two triangles of a unit square, field f(p) = 2x − 3y + 1: any point, right value, no error.
-        let f = |p: [f64; 3]| 2.0 * p[0] - 3.0 * p[1] + 1.0;
-        let square = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
-        let mut sum = FieldQuadric::<1>::default();
-        for t in [[0, 1, 2], [0, 2, 3]] {
-            let p = t.map(|i| square[i]);
-            let s = p.map(|p| [f(p)]);
-            let n = cross(sub(p[1], p[0]), sub(p[2], p[0]));
-            sum.add(&FieldQuadric::triangle(&p, [&s[0], &s[1], &s[2]], n, 0.5));
+    fn a_form_is_its_quadric_wherever_its_origin_is() {
+        let origin = [1.0f32, -2.0, 0.5];
+        let mut form = Form::default();
+        form.add_linear(Vec4::new(1.0, 2.0, -1.0, 0.25), 2.0);
+        form.add_plane_form(Vec4::new(0.0, 1.0, 0.5, 0.0), Vec4::new(1.0, 0.0, 0.0, 0.0), [1.0, 0.5, 3.0], 0.5);
+        let value = |p: [f64; 3]| {
+            let x = [0, 1, 2].map(|i| p[i] - f64::from(origin[i]));
+            let (u, v) = (x[1] + 0.5 * x[2], x[0]);
+            let linear = x[0] + 2.0 * x[1] - x[2] + 0.25;
+            2.0 * linear * linear + 0.5 * (u * u + 2.0 * 0.5 * u * v + 3.0 * v * v)
+        };
+        for by in [[0.0f32; 3], [0.5, 0.25, -1.0], [-3.0, 1.0, 2.0]] {
+            let moved = form.moved(by).widen();
+            for p in [[0.0, 0.0, 0.0], [1.5, -1.0, 2.0]] {
+                let x = [0, 1, 2].map(|i| p[i] - f64::from(origin[i] + by[i]));
+                assert!((moved.eval(x) - value(p)).abs() < 1e-4, "{by:?} {p:?}");
+            }
         }
-        let at = [0.3, 0.9, 0.0];
-        assert!((sum.solve(at).expect("weight")[0] - f(at)).abs() < 1e-12);
-        let mut reduced = Quadric::default();
-        sum.reduce_into(&mut reduced);
-        assert!(reduced.eval(at).abs() < 1e-12);
-        assert!((sum.eval_fixed(at, &[f(at) + 2.0]) - 4.0).abs() < 1e-12);
     }
 }

@@ -96,7 +96,7 @@ fn sample(triangles: &[Corners], count: usize) -> Option<Vec<[f64; 3]>> {
 }
 
 fn distances(points: &[[f64; 3]], triangles: &[Corners]) -> Distances {
-    let surface = Surface::new(triangles.to_vec());
+    let surface = Surface::new(triangles);
     let squares: Vec<f64> = points.par_iter().map(|&p| surface.squared_distance_above(p, 0.0)).collect();
     Distances::of_squares(&squares)
 }

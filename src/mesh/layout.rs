@@ -41,7 +41,7 @@ pub struct Field {
     pub offset: usize,
     /// Number of columns.
     pub components: usize,
-    /// Scale for each primitive; 0 where the primitive lacks the attribute.
+    /// Scale for each primitive, 0 where the primitive lacks the attribute; none in [`Layout::unscaled`].
     pub scale: Vec<f64>,
 }
 
@@ -61,6 +61,15 @@ pub struct Layout {
 impl Layout {
     /// The layout of `mesh`.
     pub fn new(mesh: &Mesh, scale: AttributeScale) -> Self {
+        let mut out = Self::unscaled(mesh);
+        for field in &mut out.fields {
+            field.scale = mesh.primitives.iter().map(|p| field_scale(field, p, scale, out.radius)).collect();
+        }
+        out
+    }
+
+    /// The layout of `mesh` without scales.
+    pub fn unscaled(mesh: &Mesh) -> Self {
         let (center, radius) = frame(&mesh.primitives);
         let mut fields: Vec<Field> = Vec::new();
         for primitive in &mesh.primitives {
@@ -83,7 +92,6 @@ impl Layout {
         for field in &mut fields {
             field.offset = columns;
             columns += field.components;
-            field.scale = mesh.primitives.iter().map(|p| field_scale(field, p, scale, radius)).collect();
         }
         Self { fields, columns, center, radius }
     }

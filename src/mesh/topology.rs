@@ -20,28 +20,48 @@ pub enum EdgeKind {
     Border,
 }
 
-/// A triangle. Corner `i` is vertex `v[i]` with wedge `w[i]`; edge `i` runs from corner `i` to corner `(i + 1) % 3`.
+/// The corner, or edge, after each one in a triangle.
+pub const NEXT: [usize; 3] = [1, 2, 0];
+/// The corner, or edge, before each one in a triangle.
+pub const PREVIOUS: [usize; 3] = [2, 0, 1];
+
+/// A triangle. Corner `i` is vertex `v[i]` with wedge `w[i]`; edge `i` runs from corner `i` to corner `NEXT[i]`.
 #[derive(Clone, Copy, Debug)]
 pub struct Face {
     /// Vertices; `v[0] == NONE` if the face is gone.
     pub v: [u32; 3],
     /// Wedges.
     pub w: [u32; 3],
-    /// Kind of each edge.
-    pub edges: [EdgeKind; 3],
 }
 
 impl Face {
-    /// Still part of the surface.
-    #[inline]
-    pub fn is_alive(&self) -> bool {
-        self.v[0] != NONE
-    }
-
     /// Corner of `vertex`, if the face has it.
     #[inline]
     pub fn corner(&self, vertex: u32) -> Option<usize> {
         self.v.iter().position(|&v| v == vertex)
+    }
+}
+
+/// One corner of one face.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Corner(u32);
+
+impl Corner {
+    /// The face.
+    #[inline]
+    pub fn face(self) -> usize {
+        (self.0 >> 2) as usize
+    }
+
+    /// Which of its corners, 0…2.
+    #[inline]
+    pub fn at(self) -> usize {
+        (self.0 & 3) as usize
+    }
+
+    #[inline]
+    fn new(face: usize, at: usize) -> Self {
+        Self((face as u32) << 2 | at as u32)
     }
 }
 
@@ -98,10 +118,14 @@ pub struct Contraction {
     pub t: f64,
     /// Whether that is one of the ends.
     pub place: Place,
+    /// From where `kept` and `gone` were to where `kept` is now.
+    pub moved: [[f64; 3]; 2],
     /// Wedges joined by a face on the edge: `[stays, gone]`.
     pub merged: Vec<[u32; 2]>,
-    /// Number of faces that vanished.
-    pub dead_faces: usize,
+    /// Wedges that `kept` had, then those that `gone` had.
+    pub wedges: Vec<u32>,
+    /// How many of them `kept` had.
+    pub own_wedges: usize,
 }
 
 /// The surface.
@@ -111,8 +135,10 @@ pub struct Topology {
     pub positions: Vec<[f64; 3]>,
     /// All faces; those that are gone stay in place.
     pub faces: Vec<Face>,
+    /// Kind of each edge of each face: as it was at the start, or at the last [`Self::classify_edges`] of an end.
+    pub kinds: Vec<[EdgeKind; 3]>,
     /// Wedge values, `columns` each, scaled as [`Layout`] says.
-    pub values: Vec<f64>,
+    pub values: Vec<f32>,
     /// Values of one wedge.
     pub columns: usize,
     /// Vertex of each wedge.
@@ -124,7 +150,9 @@ pub struct Topology {
     chart: Vec<u32>,
     ring_start: Vec<u32>,
     ring_len: Vec<u32>,
-    ring_pool: Vec<u32>,
+    ring_pool: Vec<Corner>,
+    /// The other two vertices of the faces at a vertex while its edges are classified.
+    spokes: Vec<[u32; 2]>,
 }
 
 impl Topology {
@@ -148,14 +176,16 @@ impl Topology {
                     let from = weld.wedge_source[wedge] as usize * field.components;
                     let to = wedge * layout.columns + field.offset;
                     for c in 0..field.components {
-                        values[to + c] = f64::from(attribute.values[from + c]) * scale;
+                        values[to + c] = (f64::from(attribute.values[from + c]) * scale) as f32;
                     }
                 }
             }
         }
+        let faces = faces(mesh, &weld);
         let mut topology = Self {
             positions,
-            faces: faces(mesh, &weld),
+            kinds: vec![[EdgeKind::Border; 3]; faces.len()],
+            faces,
             values,
             columns: layout.columns,
             wedge_vertex: weld.wedge_vertex.clone(),
@@ -166,6 +196,7 @@ impl Topology {
             ring_start: Vec::new(),
             ring_len: Vec::new(),
             ring_pool: Vec::new(),
+            spokes: Vec::new(),
         };
         topology.alive = topology.faces.len();
         topology.link_wedges();
@@ -174,17 +205,6 @@ impl Topology {
             topology.classify_edges(vertex);
         }
         (topology, weld)
-    }
-
-    /// Gives each wedge `columns` values: further ones are zero, surplus ones are dropped.
-    pub fn resize_columns(&mut self, columns: usize) {
-        let wedges = self.wedge_vertex.len();
-        let mut values = vec![0.0; wedges * columns];
-        let common = columns.min(self.columns);
-        for wedge in 0..wedges {
-            values[wedge * columns..][..common].copy_from_slice(&self.values[wedge * self.columns..][..common]);
-        }
-        (self.values, self.columns) = (values, columns);
     }
 
     fn link_wedges(&mut self) {
@@ -210,21 +230,32 @@ impl Topology {
             total += n;
         }
         let mut fill = start.clone();
-        // Contractions append merged rings behind; twice the room avoids most growing.
-        let mut pool = Vec::with_capacity(total as usize * 2);
-        pool.resize(total as usize, 0);
+        // Contractions append merged rings behind.
+        let mut pool = Vec::with_capacity(total as usize + total as usize / 4);
+        pool.resize(total as usize, Corner::default());
         for (index, face) in self.faces.iter().enumerate() {
-            for v in face.v {
-                pool[fill[v as usize] as usize] = index as u32;
+            for (at, v) in face.v.into_iter().enumerate() {
+                pool[fill[v as usize] as usize] = Corner::new(index, at);
                 fill[v as usize] += 1;
             }
         }
         (self.ring_start, self.ring_len, self.ring_pool) = (start, len, pool);
     }
 
-    /// Faces at `vertex`.
+    /// Moves all rings together, so that the pool has room again.
+    fn compact_rings(&mut self) {
+        let mut pool = Vec::with_capacity(self.ring_pool.capacity());
+        for (start, len) in self.ring_start.iter_mut().zip(&self.ring_len) {
+            let from = *start as usize;
+            *start = pool.len() as u32;
+            pool.extend_from_slice(&self.ring_pool[from..from + *len as usize]);
+        }
+        self.ring_pool = pool;
+    }
+
+    /// Corners at `vertex`.
     #[inline]
-    pub fn ring(&self, vertex: u32) -> &[u32] {
+    pub fn ring(&self, vertex: u32) -> &[Corner] {
         let start = self.ring_start[vertex as usize] as usize;
         &self.ring_pool[start..start + self.ring_len[vertex as usize] as usize]
     }
@@ -256,13 +287,13 @@ impl Topology {
 
     /// Values of `wedge`.
     #[inline]
-    pub fn value(&self, wedge: u32) -> &[f64] {
+    pub fn value(&self, wedge: u32) -> &[f32] {
         &self.values[wedge as usize * self.columns..][..self.columns]
     }
 
     /// Values of `wedge`, to be written.
     #[inline]
-    pub fn value_mut(&mut self, wedge: u32) -> &mut [f64] {
+    pub fn value_mut(&mut self, wedge: u32) -> &mut [f32] {
         &mut self.values[wedge as usize * self.columns..][..self.columns]
     }
 
@@ -272,17 +303,35 @@ impl Topology {
         face.v.map(|v| self.positions[v as usize])
     }
 
-    /// Calls `f` with every vertex that shares a face with `vertex`, once each.
+    /// Writes every vertex that shares a face with `vertex` to `out`, once each.
     #[inline]
     pub fn neighbours(&self, vertex: u32, out: &mut Vec<u32>) {
         out.clear();
-        for &face in self.ring(vertex) {
-            for v in self.faces[face as usize].v {
-                if v != vertex && !out.contains(&v) {
+        for corner in self.ring(vertex) {
+            let face = &self.faces[corner.face()];
+            for v in [face.v[NEXT[corner.at()]], face.v[PREVIOUS[corner.at()]]] {
+                if !out.contains(&v) {
                     out.push(v);
                 }
             }
         }
+    }
+
+    /// The corners at `b` and at `a` of the faces on the edge `a b`.
+    #[inline]
+    fn on_edge(&self, a: u32, b: u32) -> impl Iterator<Item = (Corner, usize)> + '_ {
+        self.ring(b).iter().filter_map(move |&corner| {
+            let face = &self.faces[corner.face()];
+            let (next, previous) = (NEXT[corner.at()], PREVIOUS[corner.at()]);
+            let other = if face.v[next] == a { next } else { previous };
+            (face.v[other] == a).then_some((corner, other))
+        })
+    }
+
+    /// Whether a face has both vertices.
+    #[inline]
+    pub fn are_joined(&self, a: u32, b: u32) -> bool {
+        self.on_edge(a, b).next().is_some()
     }
 
     /// Wedge pairs `[at a, at b]` of the faces on the edge `a b`, each once; `None` if there are more than
@@ -290,14 +339,11 @@ impl Topology {
     #[inline]
     pub fn joined_wedges(&self, a: u32, b: u32) -> Option<WedgePairs> {
         let mut out = WedgePairs::default();
-        for &face in self.ring(b) {
-            let face = &self.faces[face as usize];
-            if let Some(i) = face.corner(a) {
-                let j = face.corner(b).expect("a ring holds faces of its vertex");
-                let pair = [face.w[i], face.w[j]];
-                if !out.contains(&pair) && !out.push(pair) {
-                    return None;
-                }
+        for (corner, other) in self.on_edge(a, b) {
+            let face = &self.faces[corner.face()];
+            let pair = [face.w[other], face.w[corner.at()]];
+            if !out.contains(&pair) && !out.push(pair) {
+                return None;
             }
         }
         Some(out)
@@ -315,21 +361,24 @@ impl Topology {
             p if p == b => Place::Gone,
             _ => Place::New,
         };
-        self.merge_wedges(kept, gone, &mut done.merged);
-        done.dead_faces = self.merge_rings(kept, gone);
-        self.alive -= done.dead_faces;
+        done.moved = [sub(position, a), sub(position, b)];
+        self.merge_wedges(kept, gone, done);
+        self.alive -= self.merge_rings(kept, gone);
         self.positions[kept as usize] = position;
-        self.classify_edges(kept);
     }
 
     /// Joins the wedges that the faces on the edge connect; the others of `gone` move over to `kept`.
-    fn merge_wedges(&mut self, kept: u32, gone: u32, merged: &mut Vec<[u32; 2]>) {
-        merged.clear();
+    fn merge_wedges(&mut self, kept: u32, gone: u32, done: &mut Contraction) {
+        done.merged.clear();
+        done.wedges.clear();
+        done.wedges.extend(self.wedges(kept));
+        done.own_wedges = done.wedges.len();
+        done.wedges.extend(self.wedges(gone));
         let pairs = self.joined_wedges(kept, gone).unwrap_or_default();
         for &[a, b] in pairs.iter() {
-            let (stays, goes) = (root(merged, a), root(merged, b));
+            let (stays, goes) = (root(&done.merged, a), root(&done.merged, b));
             if stays != goes {
-                merged.push([stays, goes]);
+                done.merged.push([stays, goes]);
                 let (a, b) = (self.chart_of(stays), self.chart_of(goes));
                 self.chart[a.max(b) as usize] = a.min(b);
             }
@@ -337,12 +386,12 @@ impl Topology {
         for vertex in [kept, gone] {
             let start = self.ring_start[vertex as usize] as usize;
             for at in start..start + self.ring_len[vertex as usize] as usize {
-                for w in &mut self.faces[self.ring_pool[at] as usize].w {
-                    *w = root(merged, *w);
-                }
+                let corner = self.ring_pool[at];
+                let wedge = &mut self.faces[corner.face()].w[corner.at()];
+                *wedge = root(&done.merged, *wedge);
             }
         }
-        self.relink_wedges(kept, gone, merged);
+        self.relink_wedges(kept, gone, &done.merged);
     }
 
     /// One list at `kept` of the wedges of both that are left, in the order kept, gone.
@@ -379,31 +428,30 @@ impl Topology {
 
     /// Moves the faces of `gone` to `kept`, drops those on the edge; returns how many.
     fn merge_rings(&mut self, kept: u32, gone: u32) -> usize {
+        let both = self.ring_len[kept as usize] + self.ring_len[gone as usize];
+        if self.ring_pool.capacity() - self.ring_pool.len() < both as usize {
+            self.compact_rings();
+        }
         let start = self.ring_pool.len() as u32;
         let mut dead = 0;
-        for vertex in [kept, gone] {
+        for (vertex, other) in [(kept, gone), (gone, kept)] {
             let (from, len) = (self.ring_start[vertex as usize], self.ring_len[vertex as usize]);
             for at in from..from + len {
-                let id = self.ring_pool[at as usize];
-                let face = &mut self.faces[id as usize];
-                if !face.is_alive() {
-                    continue;
-                }
-                if vertex == kept && face.corner(gone).is_some() {
-                    let third = face.v.iter().copied().find(|&v| v != kept && v != gone);
+                let corner = self.ring_pool[at as usize];
+                let (next, previous) = (NEXT[corner.at()], PREVIOUS[corner.at()]);
+                let face = &mut self.faces[corner.face()];
+                if face.v[0] == NONE {
+                    // Dropped a moment ago, from the other side.
+                } else if face.v[next] == other || face.v[previous] == other {
+                    let third = if face.v[next] == other { previous } else { next };
+                    let vertex = face.v[third];
                     face.v[0] = NONE;
                     dead += 1;
-                    if let Some(third) = third {
-                        self.remove_from_ring(third, id);
-                    }
-                    continue;
+                    self.remove_from_ring(vertex, Corner::new(corner.face(), third));
+                } else {
+                    face.v[corner.at()] = kept;
+                    self.ring_pool.push(corner);
                 }
-                for v in &mut face.v {
-                    if *v == gone {
-                        *v = kept;
-                    }
-                }
-                self.ring_pool.push(id);
             }
         }
         self.ring_start[kept as usize] = start;
@@ -412,52 +460,56 @@ impl Topology {
         dead
     }
 
-    fn remove_from_ring(&mut self, vertex: u32, face: u32) {
+    fn remove_from_ring(&mut self, vertex: u32, corner: Corner) {
         let start = self.ring_start[vertex as usize] as usize;
         let len = self.ring_len[vertex as usize] as usize;
         let ring = &mut self.ring_pool[start..start + len];
-        if let Some(at) = ring.iter().position(|&f| f == face) {
+        if let Some(at) = ring.iter().position(|&c| c == corner) {
             ring.copy_within(at + 1.., at);
             self.ring_len[vertex as usize] -= 1;
         }
     }
 
     /// Sets the kind of every edge at `vertex`, in all its faces.
-    fn classify_edges(&mut self, vertex: u32) {
-        let start = self.ring_start[vertex as usize] as usize;
-        for at in start..start + self.ring_len[vertex as usize] as usize {
-            let id = self.ring_pool[at];
-            let corner = self.faces[id as usize].corner(vertex).expect("a ring holds faces of its vertex");
-            for (edge, other) in [(corner, (corner + 1) % 3), ((corner + 2) % 3, (corner + 2) % 3)] {
-                let kind = self.edge_kind(id, vertex, corner, other);
-                self.faces[id as usize].edges[edge] = kind;
+    pub fn classify_edges(&mut self, vertex: u32) {
+        let mut spokes = std::mem::take(&mut self.spokes);
+        spokes.clear();
+        spokes.extend(self.ring(vertex).iter().map(|corner| {
+            let face = &self.faces[corner.face()];
+            [face.v[NEXT[corner.at()]], face.v[PREVIOUS[corner.at()]]]
+        }));
+        for (index, &ends) in spokes.iter().enumerate() {
+            let corner = self.ring(vertex)[index];
+            for (end, edge) in ends.into_iter().zip([corner.at(), PREVIOUS[corner.at()]]) {
+                // This face is one of them.
+                let faces = spokes.iter().filter(|other| other[0] == end || other[1] == end).count();
+                let kind = if faces == 2 {
+                    let other = |(i, other): (usize, &[u32; 2])| (i != index && other.contains(&end)).then_some(i);
+                    let across = spokes.iter().enumerate().find_map(other).expect("the other of two");
+                    self.kind_between(corner, self.ring(vertex)[across], end)
+                } else {
+                    EdgeKind::Border
+                };
+                self.kinds[corner.face()][edge] = kind;
             }
         }
+        self.spokes = spokes;
     }
 
-    fn edge_kind(&self, id: u32, vertex: u32, corner: usize, other: usize) -> EdgeKind {
-        let face = &self.faces[id as usize];
-        let end = face.v[other];
-        let mut across = NONE;
-        for &f in self.ring(vertex) {
-            if f != id && self.faces[f as usize].v.contains(&end) {
-                if across != NONE {
-                    return EdgeKind::Border;
-                }
-                across = f;
-            }
-        }
-        if across == NONE {
-            return EdgeKind::Border;
-        }
-        let opposite = &self.faces[across as usize];
-        let at = |v: u32| opposite.w[opposite.corner(v).expect("the face has both ends")];
-        let (a, b) = ([face.w[corner], at(vertex)], [face.w[other], at(end)]);
-        if a[0] == a[1] && b[0] == b[1] {
+    /// Kind of the edge between two corners at one vertex and the vertex `end`.
+    fn kind_between(&self, corner: Corner, across: Corner, end: u32) -> EdgeKind {
+        let ends = |corner: Corner| {
+            let face = &self.faces[corner.face()];
+            let next = NEXT[corner.at()];
+            let at_end = if face.v[next] == end { next } else { PREVIOUS[corner.at()] };
+            [face.w[corner.at()], face.w[at_end]]
+        };
+        let ([a, b], [c, d]) = (ends(corner), ends(across));
+        if a == c && b == d {
             return EdgeKind::Interior;
         }
-        let same_chart = |[x, y]: [u32; 2]| x == y || self.chart_of(x) == self.chart_of(y);
-        if same_chart(a) && same_chart(b) { EdgeKind::Crease } else { EdgeKind::Seam }
+        let same_chart = |x: u32, y: u32| x == y || self.chart_of(x) == self.chart_of(y);
+        if same_chart(a, c) && same_chart(b, d) { EdgeKind::Crease } else { EdgeKind::Seam }
     }
 }
 
@@ -478,7 +530,7 @@ fn faces(mesh: &Mesh, weld: &Weld) -> Vec<Face> {
             let w = [0, 1, 2].map(|i| weld.stored[start + t[i] as usize]);
             let v = w.map(|w| weld.wedge_vertex[w as usize]);
             if v[0] != v[1] && v[1] != v[2] && v[2] != v[0] {
-                faces.push(Face { v, w, edges: [EdgeKind::Border; 3] });
+                faces.push(Face { v, w });
             }
         }
     }

@@ -24,8 +24,6 @@ pub enum Placement {
 pub struct Price {
     /// Ranks pairs; metrics are not comparable with each other. Not negative.
     pub cost: f64,
-    /// Geometric part as a length in units of the mesh's radius.
-    pub error: f64,
     /// Where the vertex that stays goes, unit frame.
     pub position: [f64; 3],
     /// The second vertex of the pair stays, not the first (matters for [`Placement::Subset`] alone).
@@ -34,6 +32,13 @@ pub struct Price {
 
 /// Prices contractions and follows them.
 pub trait ErrorMetric {
+    /// The pair `a`, `b` is about to be priced for good: brings up to date what was put off.
+    fn prepare(&mut self, _surface: &Topology, _a: u32, _b: u32) {}
+
+    /// Pairs of these vertices will be priced soon. Reads what that needs, all at once: a machine waits for many places in
+    /// memory no longer than for one. Changes nothing.
+    fn touch(&self, _surface: &Topology, _vertices: impl Iterator<Item = u32>) {}
+
     /// What contracting `a` and `b` costs; `None` = refused.
     fn price(&self, surface: &Topology, a: u32, b: u32) -> Option<Price>;
 

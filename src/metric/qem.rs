@@ -1,7 +1,7 @@
 //! `qem`: the plane quadric alone, accumulated; attributes are interpolated along the edge.
 //!
 //! M. Garland, P. Heckbert, *Surface simplification using quadric error metrics*, 1997; evaluation thesis, sections 2.1
-//! and 2.2: area-weighted planes, optimal point, border planes. The error is `sqrt(Δ / S)`, a length.
+//! and 2.2: area-weighted planes, optimal point, border planes.
 
 use super::{ErrorMetric, Placement, Price};
 use crate::mesh::topology::{Contraction, EdgeKind, Topology};
@@ -12,15 +12,13 @@ use crate::quadric::{Quadric, cross, dot, lerp, scale, sub};
 pub struct Qem {
     placement: Placement,
     quadrics: Vec<Quadric>,
-    areas: Vec<f64>,
 }
 
 impl Qem {
     /// Prepares the quadrics of the whole surface; `border` weighs the planes at borders and seams.
     pub fn new(surface: &Topology, border: f64, placement: Placement) -> Self {
         let mut quadrics = vec![Quadric::default(); surface.positions.len()];
-        let mut areas = vec![0.0; surface.positions.len()];
-        for face in &surface.faces {
+        for (face, kinds) in surface.faces.iter().zip(&surface.kinds) {
             let p = surface.corners(face);
             let normal = cross(sub(p[1], p[0]), sub(p[2], p[0]));
             let length = dot(normal, normal).sqrt();
@@ -31,9 +29,7 @@ impl Qem {
             let plane = Quadric::plane(unit, -dot(unit, p[0]), 0.5 * length);
             for (corner, &v) in face.v.iter().enumerate() {
                 quadrics[v as usize].add(&plane);
-                // A third of each incident face.
-                areas[v as usize] += length / 6.0;
-                if matches!(face.edges[corner], EdgeKind::Border | EdgeKind::Seam) {
+                if matches!(kinds[corner], EdgeKind::Border | EdgeKind::Seam) {
                     let end = face.v[(corner + 1) % 3];
                     let across = cross(unit, sub(p[(corner + 1) % 3], p[corner]));
                     // |across| is the edge's length, so the weight is its square.
@@ -43,7 +39,7 @@ impl Qem {
                 }
             }
         }
-        Self { placement, quadrics, areas }
+        Self { placement, quadrics }
     }
 
     fn combined(&self, a: u32, b: u32) -> Quadric {
@@ -52,21 +48,15 @@ impl Qem {
         q
     }
 
-    fn finish(&self, a: u32, b: u32, cost: f64, position: [f64; 3]) -> Price {
-        let area = self.areas[a as usize] + self.areas[b as usize];
-        let cost = cost.max(0.0);
-        Price { cost, error: if area > 0.0 { (cost / area).sqrt() } else { 0.0 }, position, keep_second: false }
-    }
-
-    fn price_subset(&self, surface: &Topology, a: u32, b: u32, q: &Quadric) -> Option<Price> {
+    fn price_subset(surface: &Topology, a: u32, b: u32, q: &Quadric) -> Option<Price> {
         let (pa, pb) = (surface.positions[a as usize], surface.positions[b as usize]);
         let (first, second) = (q.eval(pa), q.eval(pb));
         let first_fits = wedges_fit(surface, a, b);
         let keep_second = wedges_fit(surface, b, a) && (second < first || !first_fits);
         if keep_second {
-            return Some(Price { keep_second, ..self.finish(a, b, second, pb) });
+            return Some(Price { cost: second.max(0.0), position: pb, keep_second });
         }
-        first_fits.then(|| self.finish(a, b, first, pa))
+        first_fits.then_some(Price { cost: first.max(0.0), position: pa, keep_second })
     }
 }
 
@@ -74,7 +64,7 @@ impl ErrorMetric for Qem {
     fn price(&self, surface: &Topology, a: u32, b: u32) -> Option<Price> {
         let q = self.combined(a, b);
         if self.placement == Placement::Subset {
-            return self.price_subset(surface, a, b, &q);
+            return Self::price_subset(surface, a, b, &q);
         }
         let (pa, pb) = (surface.positions[a as usize], surface.positions[b as usize]);
         let middle = lerp(pa, pb, 0.5);
@@ -85,7 +75,7 @@ impl ErrorMetric for Qem {
                 best = (cost, p);
             }
         }
-        Some(self.finish(a, b, best.0, best.1))
+        Some(Price { cost: best.0.max(0.0), position: best.1, keep_second: false })
     }
 
     fn price_at(&self, surface: &Topology, a: u32, b: u32, position: [f64; 3]) -> Option<Price> {
@@ -96,20 +86,19 @@ impl ErrorMetric for Qem {
                 return None;
             }
         }
-        let cost = self.combined(a, b).eval(position);
-        Some(Price { keep_second, ..self.finish(a, b, cost, position) })
+        let cost = self.combined(a, b).eval(position).max(0.0);
+        Some(Price { cost, position, keep_second })
     }
 
     fn contracted(&mut self, surface: &mut Topology, done: &Contraction) {
-        let (kept, gone) = (done.kept as usize, done.gone as usize);
+        let kept = done.kept as usize;
         self.quadrics[kept] = self.combined(done.kept, done.gone);
-        self.areas[kept] += self.areas[gone];
         if self.placement == Placement::Optimal {
             for &[stays, goes] in &done.merged {
                 for column in 0..surface.columns {
                     let other = surface.value(goes)[column];
                     let value = &mut surface.value_mut(stays)[column];
-                    *value += (other - *value) * done.t;
+                    *value += (other - *value) * done.t as f32;
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! Which contractions are allowed: no triangle may turn over.
 
-use crate::mesh::topology::Topology;
+use crate::mesh::topology::{NEXT, PREVIOUS, Topology};
 use crate::quadric::{cross, dot, sub};
 
 /// No triangle may turn by more than `acos(0.2)` = 78°.
@@ -13,21 +13,19 @@ pub fn turns_gently(surface: &Topology, a: u32, b: u32, position: [f64; 3]) -> b
 }
 
 fn ring_turns_gently(surface: &Topology, moved: u32, other: u32, position: [f64; 3]) -> bool {
-    surface.ring(moved).iter().all(|&id| {
-        let face = &surface.faces[id as usize];
-        if face.corner(other).is_some() {
+    let here = surface.positions[moved as usize];
+    surface.ring(moved).iter().all(|corner| {
+        let face = &surface.faces[corner.face()];
+        let (second, third) = (face.v[NEXT[corner.at()]], face.v[PREVIOUS[corner.at()]]);
+        if second == other || third == other {
             return true;
         }
-        let corner = face.corner(moved).expect("a ring holds faces of its vertex");
-        let q = surface.positions[face.v[(corner + 1) % 3] as usize];
-        let r = surface.positions[face.v[(corner + 2) % 3] as usize];
-        let opposite = sub(r, q);
-        let before = cross(sub(q, surface.positions[moved as usize]), opposite);
+        let q = surface.positions[second as usize];
+        let opposite = sub(surface.positions[third as usize], q);
+        let before = cross(sub(q, here), opposite);
         let after = cross(sub(q, position), opposite);
-        let (turned, lengths) = (dot(before, after), dot(before, before) * dot(after, after));
-        if dot(before, before) == 0.0 {
-            return true;
-        }
-        turned > 0.0 && turned * turned > LEAST_COSINE * LEAST_COSINE * lengths
+        let size = dot(before, before);
+        let turned = dot(before, after);
+        size == 0.0 || (turned > 0.0 && turned * turned > LEAST_COSINE * LEAST_COSINE * (size * dot(after, after)))
     })
 }

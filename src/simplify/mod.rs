@@ -14,13 +14,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::mesh::Mesh;
 use crate::mesh::layout::{AttributeScale, Layout};
-use crate::mesh::topology::{Contraction, EdgeKind, Topology};
+use crate::mesh::topology::{Contraction, EdgeKind, NEXT, Topology};
 use crate::metric::its::{EdgeWeights, Its};
 use crate::metric::qem::Qem;
 use crate::metric::{ErrorMetric, Placement, Price};
 use crate::quadric::{cross, dot, lerp, sub};
 use progressive::{Progressive, Recorder};
-use queue::Queue;
+use queue::{Entry, Queue};
 
 /// Which metric prices contractions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,30 +63,13 @@ pub fn simplify(mesh: &Mesh, settings: &Settings) -> Progressive {
     build(&mut surface, settings, &locks, recorder)
 }
 
-/// Numbers of columns that meshes have: normals, + one or two texture sets, + colours. Others are padded with zeros.
-const WIDTHS: [usize; 6] = [3, 5, 7, 9, 16, 32];
-
-/// The only place that builds a metric. The number of columns is a compile-time constant of `its`, so that its inner
-/// loops have known lengths.
+/// The only place that builds a metric.
 fn build(surface: &mut Topology, settings: &Settings, locks: &Locks, recorder: Recorder) -> Progressive {
-    if settings.metric == MetricKind::Qem {
-        let metric = Qem::new(surface, settings.edges.border, settings.placement);
-        return run(surface, metric, locks, recorder);
+    let Settings { edges, placement, memoryless, .. } = *settings;
+    match settings.metric {
+        MetricKind::Qem => run(surface, Qem::new(surface, edges.border, placement), locks, recorder),
+        MetricKind::Its => run(surface, Its::new(surface, edges, placement, memoryless), locks, recorder),
     }
-    let width = WIDTHS.into_iter().find(|&width| surface.columns <= width).expect("a layout has at most 32 columns");
-    surface.resize_columns(width);
-    macro_rules! its {
-        ($($m:literal)*) => {
-            match width {
-                $($m => {
-                    let metric = Its::<$m>::new(surface, settings.edges, settings.placement, settings.memoryless);
-                    run(surface, metric, locks, recorder)
-                })*
-                _ => unreachable!("a width of the list"),
-            }
-        };
-    }
-    its!(3 5 7 9 16 32)
 }
 
 /// Vertices that must stay where they are.
@@ -98,10 +81,10 @@ impl Locks {
         let mut held = Vec::new();
         if lock_border {
             held.resize(surface.positions.len(), false);
-            for face in &surface.faces {
-                for edge in (0..3).filter(|&edge| face.edges[edge] == EdgeKind::Border) {
+            for (face, kinds) in surface.faces.iter().zip(&surface.kinds) {
+                for edge in (0..3).filter(|&edge| kinds[edge] == EdgeKind::Border) {
                     held[face.v[edge] as usize] = true;
-                    held[face.v[(edge + 1) % 3] as usize] = true;
+                    held[face.v[NEXT[edge]] as usize] = true;
                 }
             }
         }
@@ -126,45 +109,142 @@ impl Locks {
     }
 }
 
-fn run<E: ErrorMetric>(surface: &mut Topology, mut metric: E, locks: &Locks, mut recorder: Recorder) -> Progressive {
-    let mut queue = Queue::new(surface.positions.len());
-    let (mut neighbours, mut second) = (Vec::new(), Vec::new());
-    let mut done = Contraction::default();
-    // Ends of pairs that were illegal when their turn came: tried again when something beside them changes.
-    let mut refused = vec![false; surface.positions.len()];
-    fill(surface, &metric, locks, &mut queue);
-    while let Some((a, b, entered)) = queue.pop() {
-        let Some(mut price) = locks.price(&metric, surface, a, b) else { continue };
-        price.cost += vanishing(surface, a, b);
-        // Prices are not kept up to date behind the queue's back: a pair is priced again when its turn comes.
-        if !queue.is_next(price.cost, entered) {
-            queue.push(a, b, price.cost);
-            continue;
-        }
-        let Some(price) = legal_price(surface, &metric, locks, [a, b], price) else {
-            (refused[a as usize], refused[b as usize]) = (true, true);
-            continue;
-        };
-        // The middle may be far dearer than the best place: it waits for its own turn.
-        if !queue.is_next(price.cost, entered) {
-            queue.push(a, b, price.cost);
-            continue;
-        }
-        let (kept, gone) = if price.keep_second { (b, a) } else { (a, b) };
-        surface.contract(kept, gone, price.position, &mut done);
-        metric.contracted(surface, &done);
-        recorder.record(surface, &done, &price);
-        queue.merged(kept, gone);
-        surface.neighbours(kept, &mut neighbours);
-        push_all(surface, &metric, locks, &mut queue, kept, &neighbours);
-        for &vertex in &neighbours {
-            if std::mem::take(&mut refused[vertex as usize]) {
-                surface.neighbours(vertex, &mut second);
-                push_all(surface, &metric, locks, &mut queue, vertex, &second);
+fn run<E: ErrorMetric>(surface: &mut Topology, metric: E, locks: &Locks, recorder: Recorder) -> Progressive {
+    let mut driver = Driver { queue: Queue::new(), recorder, done: Contraction::default(), surface, metric, locks };
+    driver.fill();
+    driver.run();
+    driver.recorder.finish()
+}
+
+/// A run on its way.
+struct Driver<'a, E> {
+    surface: &'a mut Topology,
+    metric: E,
+    locks: &'a Locks,
+    queue: Queue,
+    recorder: Recorder,
+    done: Contraction,
+}
+
+/// Stamp of a vertex that is gone.
+const GONE: u32 = u32::MAX;
+
+/// Pairs whose surroundings are read before their turn.
+const AHEAD: usize = 8;
+
+impl<E: ErrorMetric> Driver<'_, E> {
+    fn price(&self, a: u32, b: u32) -> Option<Price> {
+        let mut price = self.locks.price(&self.metric, self.surface, a, b)?;
+        price.cost += vanishing(self.surface, a, b);
+        Some(price)
+    }
+
+    /// Enters every pair.
+    fn fill(&mut self) {
+        let mut neighbours = Vec::new();
+        for a in 0..self.surface.positions.len() as u32 {
+            self.surface.neighbours(a, &mut neighbours);
+            for &b in neighbours.iter().filter(|&&b| a < b) {
+                if let Some(price) = self.locks.price(&self.metric, self.surface, a, b) {
+                    self.queue.push(a, b, price.cost, 0);
+                }
             }
         }
     }
-    recorder.finish()
+
+    fn contract(&mut self, a: u32, b: u32, price: &Price) -> [u32; 2] {
+        let (kept, gone) = if price.keep_second { (b, a) } else { (a, b) };
+        self.surface.contract(kept, gone, price.position, &mut self.done);
+        self.metric.contracted(self.surface, &self.done);
+        self.recorder.record(self.surface, &self.done, price);
+        [kept, gone]
+    }
+
+    /// All pairs at the merged vertex are priced anew and entered again. Other prices are not kept up to date behind the
+    /// queue's back: a pair is priced again when its turn comes.
+    fn run(&mut self) {
+        let vertices = self.surface.positions.len();
+        // Number of merges into each vertex. An entry carries the sum of both ends; another sum means it is void.
+        let mut stamps = vec![0u32; vertices];
+        // Ends of pairs that were illegal when their turn came: tried again when something beside them changes.
+        let mut refused = vec![false; vertices];
+        let (mut neighbours, mut second) = (Vec::new(), Vec::new());
+        let mut until_touch = 0;
+        while let Some(Entry { a, b, tag }) = self.queue.pop() {
+            if until_touch == 0 {
+                self.touch_ahead(&stamps);
+                until_touch = AHEAD;
+            }
+            until_touch -= 1;
+            let now = [stamps[a as usize], stamps[b as usize]];
+            if now.contains(&GONE) || now[0].wrapping_add(now[1]) != tag {
+                continue;
+            }
+            self.metric.prepare(self.surface, a, b);
+            let Some(price) = self.price(a, b) else { continue };
+            if !self.queue.is_due(price.cost) {
+                self.queue.push(a, b, price.cost, tag);
+                continue;
+            }
+            let Some(price) = self.legal_price([a, b], price) else {
+                (refused[a as usize], refused[b as usize]) = (true, true);
+                continue;
+            };
+            // The middle may be far dearer than the best place: it waits for its own turn.
+            if !self.queue.is_due(price.cost) {
+                self.queue.push(a, b, price.cost, tag);
+                continue;
+            }
+            let [kept, gone] = self.contract(a, b, &price);
+            stamps[gone as usize] = GONE;
+            stamps[kept as usize] += 1;
+            self.surface.neighbours(kept, &mut neighbours);
+            self.push_all(&stamps, kept, &neighbours);
+            for &vertex in &neighbours {
+                if std::mem::take(&mut refused[vertex as usize]) {
+                    self.surface.neighbours(vertex, &mut second);
+                    self.push_all(&stamps, vertex, &second);
+                }
+            }
+        }
+    }
+
+    /// Reads what the next pairs need, all at once.
+    fn touch_ahead(&self, stamps: &[u32]) {
+        let current = |e: &&Entry| stamps[e.a as usize].wrapping_add(stamps[e.b as usize]) == e.tag;
+        let ahead = self.queue.ahead(AHEAD).iter().filter(current);
+        self.metric.touch(self.surface, ahead.clone().flat_map(|entry| [entry.a, entry.b]));
+        let here = |v: u32| self.surface.positions[v as usize][0] + self.surface.ring(v).len() as f64;
+        std::hint::black_box(ahead.map(|entry| here(entry.a) + here(entry.b)).sum::<f64>());
+    }
+
+    fn push_all(&mut self, stamps: &[u32], vertex: u32, others: &[u32]) {
+        self.metric.touch(self.surface, others.iter().copied());
+        for &other in others {
+            if let Some(price) = self.locks.price(&self.metric, self.surface, vertex, other) {
+                let tag = stamps[vertex as usize].wrapping_add(stamps[other as usize]);
+                self.queue.push(vertex, other, price.cost, tag);
+            }
+        }
+    }
+
+    /// The price if the contraction is legal; else that of contracting to the middle if that is; else `None`.
+    fn legal_price(&self, [a, b]: [u32; 2], price: Price) -> Option<Price> {
+        let surface = &*self.surface;
+        if legal::turns_gently(surface, a, b, price.position) {
+            return Some(price);
+        }
+        if self.locks.holds(a) || self.locks.holds(b) {
+            return None;
+        }
+        let middle = lerp(surface.positions[a as usize], surface.positions[b as usize], 0.5);
+        if !legal::turns_gently(surface, a, b, middle) {
+            return None;
+        }
+        let mut price = self.metric.price_at(surface, a, b, middle)?;
+        price.cost += vanishing(surface, a, b);
+        Some(price)
+    }
 }
 
 /// What it costs, besides the metric's price, that nothing is left of a part: its area times the square of its longest
@@ -172,57 +252,15 @@ fn run<E: ErrorMetric>(surface: &mut Topology, mut metric: E, locks: &Locks, mut
 /// without this, lamp posts and railings would be the first to go.
 fn vanishing(surface: &Topology, a: u32, b: u32) -> f64 {
     let (ring, other) = (surface.ring(a), surface.ring(b));
-    if ring.len() != other.len() || ring.iter().any(|&id| surface.faces[id as usize].corner(b).is_none()) {
+    if ring.len() != other.len() || ring.iter().any(|corner| surface.faces[corner.face()].corner(b).is_none()) {
         return 0.0;
     }
-    let sizes = ring.iter().map(|&id| {
-        let p = surface.corners(&surface.faces[id as usize]);
+    let sizes = ring.iter().map(|corner| {
+        let p = surface.corners(&surface.faces[corner.face()]);
         let edges = [sub(p[1], p[0]), sub(p[2], p[1]), sub(p[0], p[2])];
         let n = cross(edges[0], edges[1]);
         (dot(n, n).sqrt() / 2.0, edges.map(|e| dot(e, e)).into_iter().fold(0.0, f64::max))
     });
     let (area, longest) = sizes.fold((0.0, 0.0f64), |sum, size| (sum.0 + size.0, sum.1.max(size.1)));
     area * longest
-}
-
-/// The price if the contraction is legal; else that of contracting to the middle if that is; else `None`.
-fn legal_price<E: ErrorMetric>(
-    s: &Topology,
-    metric: &E,
-    locks: &Locks,
-    [a, b]: [u32; 2],
-    price: Price,
-) -> Option<Price> {
-    if legal::turns_gently(s, a, b, price.position) {
-        return Some(price);
-    }
-    if locks.holds(a) || locks.holds(b) {
-        return None;
-    }
-    let middle = lerp(s.positions[a as usize], s.positions[b as usize], 0.5);
-    let vanishing = vanishing(s, a, b);
-    let mut price = metric.price_at(s, a, b, middle)?;
-    price.cost += vanishing;
-    legal::turns_gently(s, a, b, middle).then_some(price)
-}
-
-fn push_all<E: ErrorMetric>(s: &Topology, metric: &E, locks: &Locks, queue: &mut Queue, vertex: u32, others: &[u32]) {
-    for &other in others {
-        if let Some(price) = locks.price(metric, s, vertex, other) {
-            queue.push(vertex, other, price.cost);
-        }
-    }
-}
-
-fn fill<E: ErrorMetric>(surface: &Topology, metric: &E, locks: &Locks, queue: &mut Queue) {
-    let mut neighbours = Vec::new();
-    for a in 0..surface.positions.len() as u32 {
-        surface.neighbours(a, &mut neighbours);
-        for &b in neighbours.iter().filter(|&&b| a < b) {
-            if let Some(price) = locks.price(metric, surface, a, b) {
-                queue.stage(a, b, price.cost);
-            }
-        }
-    }
-    queue.heapify();
 }

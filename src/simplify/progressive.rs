@@ -45,8 +45,6 @@ pub struct Step {
     pub t: f32,
     /// Cost in units of the object: comparable between sub-meshes of one run of the same metric.
     pub cost: f32,
-    /// Geometric error in object space units.
-    pub error: f32,
     /// Triangles left after this step.
     pub triangles: u32,
     /// End of this step's entries in [`Progressive::merges`].
@@ -105,7 +103,11 @@ impl Recorder {
             wedges: surface.wedge_vertex.len() as u32,
             columns: layout.columns as u32,
             triangles: surface.alive as u32,
-            ..Progressive::default()
+            // What a run needs if most wedges stand alone: growing by doubling would hold everything twice.
+            steps: Vec::with_capacity(surface.positions.len()),
+            merges: Vec::with_capacity(surface.wedge_vertex.len()),
+            set_wedges: Vec::with_capacity(surface.wedge_vertex.len()),
+            set_values: Vec::with_capacity(surface.values.len()),
         };
         // Area times squared distance: the fourth power of the unit.
         let squared = layout.radius * layout.radius;
@@ -132,7 +134,7 @@ impl Recorder {
             self.out.set_wedges.push(wedge);
             let unscale = &self.unscale[self.wedge_primitive[wedge as usize] as usize * self.columns..];
             let values = surface.value(wedge).iter().zip(&unscale[..self.columns]);
-            self.out.set_values.extend(values.map(|(value, unscale)| (value * unscale) as f32));
+            self.out.set_values.extend(values.map(|(value, unscale)| (f64::from(*value) * unscale) as f32));
         }
         let position = match done.place {
             Place::Kept => self.positions[done.kept as usize],
@@ -146,7 +148,6 @@ impl Recorder {
             position,
             t: done.t as f32,
             cost: (price.cost * self.cost_scale) as f32,
-            error: (price.error * self.layout.radius) as f32,
             triangles: surface.alive as u32,
             merges_end: self.out.merges.len() as u32,
             set_end: self.out.set_wedges.len() as u32,

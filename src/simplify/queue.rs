@@ -1,87 +1,119 @@
-//! The priority queue of pairs: least cost first, ties by vertex numbers; entries of merged vertices die by stamp.
+//! The queue of pairs: cheapest first, but for differences too small to be seen.
+//!
+//! Pairs lie in bins of a sixteenth of an octave of cost (2 % of a distance) and leave a bin in the order in which they
+//! came. That order follows the mesh, so neighbours come soon after each other, and the memory of one is at hand for the
+//! next; an exact order jumps about the whole surface and waits for memory most of the time.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
-/// Ordered by cost, then by the two vertices. Costs are not negative, so their bits order as they do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Entry {
-    cost: u32,
-    a: u32,
-    b: u32,
-    /// Sum of the stamps of both ends when the entry was made.
-    stamp: u32,
+/// A pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// One vertex.
+    pub a: u32,
+    /// The other one.
+    pub b: u32,
+    /// Whatever the driver wants to know again.
+    pub tag: u32,
 }
 
 /// Pairs by price.
 #[derive(Debug)]
 pub struct Queue {
-    heap: BinaryHeap<Reverse<Entry>>,
-    staged: Vec<Reverse<Entry>>,
-    /// Number of merges into each vertex; [`GONE`] if the vertex is gone.
-    stamps: Vec<u32>,
+    bins: Vec<Bin>,
+    /// No bin before this one has anything.
+    open: usize,
 }
 
-const GONE: u32 = u32::MAX;
+#[derive(Clone, Debug, Default)]
+struct Bin {
+    entries: Vec<Entry>,
+    /// How many of them are gone.
+    done: usize,
+}
 
-fn bits(cost: f64) -> u32 {
+/// Bits of a cost that its bin does not depend on: four bits of the mantissa are left.
+const SHIFT: u32 = 19;
+
+/// Costs are not negative, so their bits order as they do.
+fn bin(cost: f64) -> usize {
     // −0 would order above everything.
-    (cost.max(0.0) as f32 + 0.0).to_bits()
+    ((cost.max(0.0) as f32 + 0.0).to_bits() >> SHIFT) as usize
 }
 
 impl Queue {
-    /// An empty queue over that many vertices.
-    pub fn new(vertices: usize) -> Self {
-        Self { heap: BinaryHeap::new(), staged: Vec::new(), stamps: vec![0; vertices] }
-    }
-
-    fn entry(&self, a: u32, b: u32, cost: f64) -> Reverse<Entry> {
-        let (a, b) = (a.min(b), a.max(b));
-        let stamp = self.stamps[a as usize].wrapping_add(self.stamps[b as usize]);
-        Reverse(Entry { cost: bits(cost), a, b, stamp })
-    }
-
-    /// Adds a pair without ordering it yet; [`Self::heapify`] orders all staged pairs at once.
-    pub fn stage(&mut self, a: u32, b: u32, cost: f64) {
-        let entry = self.entry(a, b, cost);
-        self.staged.push(entry);
-    }
-
-    /// Orders what was staged, in linear time.
-    pub fn heapify(&mut self) {
-        self.heap = BinaryHeap::from(std::mem::take(&mut self.staged));
+    /// An empty queue.
+    pub fn new() -> Self {
+        Self { bins: vec![Bin::default(); bin(f64::INFINITY) + 1], open: 0 }
     }
 
     /// Adds a pair.
     #[inline]
-    pub fn push(&mut self, a: u32, b: u32, cost: f64) {
-        let entry = self.entry(a, b, cost);
-        self.heap.push(entry);
+    pub fn push(&mut self, a: u32, b: u32, cost: f64, tag: u32) {
+        let bin = bin(cost);
+        self.open = self.open.min(bin);
+        self.bins[bin].entries.push(Entry { a, b, tag });
     }
 
-    /// The cheapest pair whose ends have not been merged since, with the cost it was entered at.
+    /// The next pair.
     #[inline]
-    pub fn pop(&mut self) -> Option<(u32, u32, u32)> {
-        while let Some(Reverse(entry)) = self.heap.pop() {
-            let (a, b) = (self.stamps[entry.a as usize], self.stamps[entry.b as usize]);
-            if a != GONE && b != GONE && a.wrapping_add(b) == entry.stamp {
-                return Some((entry.a, entry.b, entry.cost));
+    pub fn pop(&mut self) -> Option<Entry> {
+        loop {
+            let bin = &mut self.bins[self.open];
+            if let Some(&entry) = bin.entries.get(bin.done) {
+                bin.done += 1;
+                return Some(entry);
             }
+            *bin = Bin::default();
+            if self.open + 1 == self.bins.len() {
+                return None;
+            }
+            self.open += 1;
         }
-        None
     }
 
-    /// Whether a pair just popped at `entered` may go ahead at `cost`: it is no dearer than it was, or than the next.
+    /// The pairs that come after the next ones if nothing cheaper is added: `count` of them, or fewer.
     #[inline]
-    pub fn is_next(&self, cost: f64, entered: u32) -> bool {
-        let cost = bits(cost);
-        cost <= entered || self.heap.peek().is_none_or(|next| cost <= next.0.cost)
+    pub fn ahead(&self, count: usize) -> &[Entry] {
+        let bin = &self.bins[self.open];
+        &bin.entries[bin.done..(bin.done + count).min(bin.entries.len())]
     }
 
-    /// `gone` was merged into `kept`: all their entries are void.
+    /// Whether a pair of that cost need not wait.
     #[inline]
-    pub fn merged(&mut self, kept: u32, gone: u32) {
-        self.stamps[gone as usize] = GONE;
-        self.stamps[kept as usize] += 1;
+    pub fn is_due(&self, cost: f64) -> bool {
+        bin(cost) <= self.open
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pairs_come_by_cost_and_in_order_where_costs_are_alike() {
+        let mut queue = Queue::new();
+        let costs = [3.0, 0.0, 1e-30, 7e20, 1.0, 1.001, -0.0, f64::INFINITY, 2.5, 1.0];
+        for (index, &cost) in costs.iter().enumerate() {
+            queue.push(index as u32, 99, cost, 7);
+        }
+        let mut order = Vec::new();
+        while let Some(entry) = queue.pop() {
+            assert_eq!((entry.b, entry.tag), (99, 7));
+            order.push(entry.a);
+        }
+        assert_eq!(order, [1, 6, 2, 4, 5, 9, 8, 0, 3, 7]);
+    }
+
+    #[test]
+    fn late_pairs_find_their_place() {
+        let mut queue = Queue::new();
+        queue.push(0, 1, 1.0, 0);
+        queue.push(2, 3, 4.0, 0);
+        assert_eq!(queue.pop().map(|entry| entry.a), Some(0));
+        assert!(queue.is_due(0.5) && queue.is_due(1.01) && !queue.is_due(1.2));
+        // Cheaper than what is open: comes next. Dearer: waits.
+        queue.push(4, 5, 0.25, 0);
+        queue.push(6, 7, 2.0, 0);
+        let left: Vec<u32> = std::iter::from_fn(|| queue.pop()).map(|entry| entry.a).collect();
+        assert_eq!(left, [4, 6, 2]);
     }
 }

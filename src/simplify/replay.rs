@@ -5,26 +5,70 @@
 //! custom attributes) is taken from the nearer end.
 
 use super::progressive::Progressive;
-use crate::mesh::layout::{AttributeScale, Field, FieldKind, Layout};
+use crate::mesh::layout::{Field, FieldKind, Layout};
 use crate::mesh::weld::{NONE, Weld, weld};
 use crate::mesh::{Attribute, ComponentType, LevelOwnVertices, Mesh, Primitive};
 use crate::quadric::{cross, dot, sub};
+
+/// What all replays on one mesh share.
+#[derive(Debug)]
+pub struct Welded {
+    /// Source position of each vertex.
+    pub positions: Vec<[f32; 3]>,
+    weld: Weld,
+    fields: Vec<Field>,
+    columns: usize,
+}
+
+impl Welded {
+    /// Welds `mesh` as the simplifier does.
+    pub fn new(mesh: &Mesh) -> Self {
+        // Recorded values are unscaled.
+        let layout = Layout::unscaled(mesh);
+        let weld = weld(mesh, &layout);
+        let mut positions = vec![[0.0; 3]; weld.vertices];
+        for wedge in 0..weld.wedge_vertex.len() {
+            let source = &mesh.primitives[weld.wedge_primitive[wedge] as usize];
+            positions[weld.wedge_vertex[wedge] as usize] = source.positions()[weld.wedge_source[wedge] as usize];
+        }
+        Self { positions, weld, columns: layout.columns, fields: layout.fields }
+    }
+
+    /// Vertices of all triangles of `mesh`, without those that have two corners at one vertex.
+    pub fn triangles(&self, mesh: &Mesh) -> Vec<[u32; 3]> {
+        let of = |w: [u32; 3]| w.map(|w| self.weld.wedge_vertex[w as usize]);
+        (0..mesh.primitives.len())
+            .flat_map(|index| self.wedges(mesh, index).map(of))
+            .filter(|&v| is_triangle(v))
+            .collect()
+    }
+
+    /// Wedges of the triangles of one primitive.
+    fn wedges<'a>(&'a self, mesh: &'a Mesh, index: usize) -> impl Iterator<Item = [u32; 3]> + 'a {
+        let stored = &self.weld.stored[self.weld.stored_start[index]..];
+        mesh.primitives[index].indices.chunks_exact(3).map(|t| [0, 1, 2].map(|i| stored[t[i] as usize]))
+    }
+}
+
+fn is_triangle(v: [u32; 3]) -> bool {
+    v[0] != v[1] && v[1] != v[2] && v[2] != v[0]
+}
 
 /// A surface on its way down the sequence.
 #[derive(Debug)]
 pub struct Replay<'a> {
     mesh: &'a Mesh,
     sequence: &'a Progressive,
-    fields: Vec<Field>,
-    weld: Weld,
+    welded: &'a Welded,
     steps: usize,
     vertex_up: Vec<u32>,
     wedge_up: Vec<u32>,
     wedge_vertex: Vec<u32>,
     positions: Vec<[f32; 3]>,
-    moved: Vec<bool>,
     values: Vec<f32>,
     passive: Passive,
+    /// Wedges of the triangles of each primitive that were left at the last cut.
+    left: Vec<Vec<[u32; 3]>>,
 }
 
 /// One primitive at a cut.
@@ -38,38 +82,32 @@ pub struct CutPrimitive {
 
 impl<'a> Replay<'a> {
     /// The surface before the first step. `sequence` must have been recorded on `mesh`.
-    pub fn new(mesh: &'a Mesh, sequence: &'a Progressive) -> Self {
-        // Scales do not matter here: recorded values are unscaled.
-        let layout = Layout::new(mesh, AttributeScale { normal: 1.0, texcoord: 1.0, color: 1.0 });
-        let weld = weld(mesh, &layout);
-        let wedges = weld.wedge_vertex.len();
-        let mut positions = vec![[0.0; 3]; weld.vertices];
-        let mut values = vec![0.0; wedges * layout.columns];
-        for wedge in 0..wedges {
-            let source = &mesh.primitives[weld.wedge_primitive[wedge] as usize];
-            let stored = weld.wedge_source[wedge] as usize;
-            positions[weld.wedge_vertex[wedge] as usize] = source.positions()[stored];
-            for field in &layout.fields {
-                let Some(attribute) = source.attribute(&field.name) else { continue };
-                if attribute.components == field.components {
-                    let from = &attribute.values[stored * field.components..][..field.components];
-                    values[wedge * layout.columns + field.offset..][..field.components].copy_from_slice(from);
-                }
+    pub fn new(mesh: &'a Mesh, welded: &'a Welded, sequence: &'a Progressive) -> Self {
+        let weld = &welded.weld;
+        let (wedges, columns) = (weld.wedge_vertex.len(), welded.columns);
+        let mut values = vec![0.0; wedges * columns];
+        for field in &welded.fields {
+            let of = |p: &'a Primitive| p.attribute(&field.name).filter(|a| a.components == field.components);
+            let sources: Vec<Option<&Attribute>> = mesh.primitives.iter().map(of).collect();
+            for wedge in 0..wedges {
+                let Some(attribute) = sources[weld.wedge_primitive[wedge] as usize] else { continue };
+                let from = weld.wedge_source[wedge] as usize * field.components;
+                values[wedge * columns + field.offset..][..field.components]
+                    .copy_from_slice(&attribute.values[from..from + field.components]);
             }
         }
         Self {
             mesh,
             sequence,
-            passive: Passive::new(mesh, &layout.fields, &weld),
-            fields: layout.fields,
+            welded,
+            passive: Passive::new(mesh, &welded.fields, weld),
             steps: 0,
             vertex_up: (0..weld.vertices as u32).collect(),
             wedge_up: (0..wedges as u32).collect(),
             wedge_vertex: weld.wedge_vertex.clone(),
-            moved: vec![false; weld.vertices],
-            positions,
+            positions: welded.positions.clone(),
             values,
-            weld,
+            left: (0..mesh.primitives.len()).map(|index| welded.wedges(mesh, index).collect()).collect(),
         }
     }
 
@@ -93,24 +131,24 @@ impl<'a> Replay<'a> {
             }
             self.vertex_up[step.gone as usize] = step.kept;
             self.positions[step.kept as usize] = step.position;
-            self.moved[step.kept as usize] = true;
         }
         self.steps = self.steps.max(steps.min(self.sequence.steps.len()));
     }
 
-    /// Vertex that source vertex `vertex` has become.
-    pub fn vertex_root(&mut self, vertex: u32) -> u32 {
-        find(&mut self.vertex_up, vertex)
+    /// For each source vertex the one that it has become.
+    pub fn roots(&mut self) -> Vec<u32> {
+        (0..self.vertex_up.len() as u32).map(|vertex| find(&mut self.vertex_up, vertex)).collect()
     }
 
-    /// Position of a vertex that is still there, object space.
-    pub fn position(&self, vertex: u32) -> [f32; 3] {
-        self.positions[vertex as usize]
+    /// Positions of vertices that are still there, object space.
+    pub fn positions(&self) -> &[[f32; 3]] {
+        &self.positions
     }
 
-    /// The source surface's welding.
-    pub fn weld(&self) -> &Weld {
-        &self.weld
+    /// The triangles of a cut, as vertices.
+    pub fn triangles(&self, cut: &CutPrimitive) -> impl Iterator<Item = [u32; 3]> {
+        let vertex = |i: u32| self.wedge_vertex[cut.wedges[i as usize] as usize];
+        cut.indices.chunks_exact(3).map(move |t| [0, 1, 2].map(|i| vertex(t[i])))
     }
 
     /// Position of a wedge that is still there, object space.
@@ -126,29 +164,20 @@ impl<'a> Replay<'a> {
     /// The triangles of each primitive that are left, in source order.
     pub fn primitives(&mut self) -> Vec<CutPrimitive> {
         let mut local = vec![NONE; self.wedge_up.len()];
-        let mesh = self.mesh;
-        let mut out = Vec::with_capacity(mesh.primitives.len());
-        for (index, primitive) in mesh.primitives.iter().enumerate() {
-            let start = self.weld.stored_start[index];
+        let mut out = Vec::with_capacity(self.left.len());
+        for left in &mut self.left {
             let mut cut = CutPrimitive::default();
-            for triangle in primitive.indices.chunks_exact(3) {
-                let w = [0, 1, 2].map(|i| self.weld.stored[start + triangle[i] as usize]);
-                let v = w.map(|w| {
-                    let vertex = self.weld.wedge_vertex[w as usize];
-                    find(&mut self.vertex_up, vertex)
-                });
-                if v[0] == v[1] || v[1] == v[2] || v[2] == v[0] {
-                    continue;
+            left.retain_mut(|w| {
+                *w = w.map(|w| find(&mut self.wedge_up, w));
+                is_triangle(w.map(|w| self.wedge_vertex[w as usize]))
+            });
+            for &wedge in left.iter().flatten() {
+                let at = &mut local[wedge as usize];
+                if *at == NONE {
+                    *at = cut.wedges.len() as u32;
+                    cut.wedges.push(wedge);
                 }
-                for wedge in w {
-                    let wedge = find(&mut self.wedge_up, wedge);
-                    let at = &mut local[wedge as usize];
-                    if *at == NONE {
-                        *at = cut.wedges.len() as u32;
-                        cut.wedges.push(wedge);
-                    }
-                    cut.indices.push(*at);
-                }
+                cut.indices.push(*at);
             }
             for &wedge in &cut.wedges {
                 local[wedge as usize] = NONE;
@@ -164,7 +193,7 @@ impl<'a> Replay<'a> {
         let normals = primitive.attribute("NORMAL").map(|_| self.normals(cut));
         let attribute = |source: &Attribute| {
             let mut values = Vec::with_capacity(cut.wedges.len() * source.components);
-            match self.fields.iter().find(|f| f.name == source.name && f.components == source.components) {
+            match self.welded.fields.iter().find(|f| f.name == source.name && f.components == source.components) {
                 _ if source.name == "POSITION" => {
                     values.extend(cut.wedges.iter().flat_map(|&w| self.wedge_position(w)));
                 }
@@ -198,7 +227,7 @@ impl<'a> Replay<'a> {
 
     /// Unit normals; where the solved one vanishes, the normal of the wedge's triangles in the level.
     fn normals(&self, cut: &CutPrimitive) -> Vec<[f32; 3]> {
-        let field = self.fields.iter().find(|f| f.kind == FieldKind::Normal).expect("the primitive has normals");
+        let field = self.welded.fields.iter().find(|f| f.kind == FieldKind::Normal).expect("the primitive has normals");
         let mut flat = vec![[0.0f64; 3]; 0];
         let mut out = Vec::with_capacity(cut.wedges.len());
         for (local, &wedge) in cut.wedges.iter().enumerate() {

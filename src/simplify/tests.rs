@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::replay::Replay;
+use super::replay::{Replay, Welded};
 use super::*;
 use crate::mesh::{Attribute, Format, Primitive};
 use crate::quadric::{cross, dot, sub};
@@ -65,7 +65,8 @@ fn torus(columns: u32, rows: u32) -> Mesh {
 
 /// Positions of the triangles after `steps`.
 fn triangles(mesh: &Mesh, sequence: &Progressive, steps: usize) -> Vec<[[f32; 3]; 3]> {
-    let mut replay = Replay::new(mesh, sequence);
+    let welded = Welded::new(mesh);
+    let mut replay = Replay::new(mesh, &welded, sequence);
     replay.advance(steps);
     let cuts = replay.primitives();
     let corner = |cut: &replay::CutPrimitive, i: u32| replay.wedge_position(cut.wedges[i as usize]);
@@ -97,7 +98,8 @@ fn a_flat_grid_keeps_its_texture_where_it_was() {
     let mesh = one(grid(10, 10, |u, v| ([u, v, 0.5], [0.25 + u * 0.5, 1.0 - v])));
     for settings in all_settings() {
         let sequence = simplify(&mesh, &settings);
-        let mut replay = Replay::new(&mesh, &sequence);
+        let welded = Welded::new(&mesh);
+        let mut replay = Replay::new(&mesh, &welded, &sequence);
         replay.advance(sequence.cut_at(20));
         let cut = &replay.primitives()[0];
         let own = replay.vertices(0, cut);
@@ -135,7 +137,8 @@ fn texture_seams_do_not_smear_across_the_texture() {
     let mesh = torus(32, 20);
     for settings in all_settings() {
         let sequence = simplify(&mesh, &settings);
-        let mut replay = Replay::new(&mesh, &sequence);
+        let welded = Welded::new(&mesh);
+        let mut replay = Replay::new(&mesh, &welded, &sequence);
         replay.advance(sequence.cut_at(mesh.triangles() / 4));
         let cut = &replay.primitives()[0];
         let own = replay.vertices(0, cut);

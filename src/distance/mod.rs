@@ -2,6 +2,8 @@
 //!
 //! Knows positions and triangles only. Deterministic: splits by median, ties by triangle number.
 
+pub mod near;
+
 use crate::quadric::{cross, dot, sub};
 
 /// A surface that can be asked for nearest points.
@@ -11,7 +13,7 @@ pub struct Surface {
     nodes: Vec<Node>,
 }
 
-/// Leaf if `count > 0`: triangles `first..first + count`; else children `first` and `first + 1`.
+/// Leaf if `count > 0`: triangles `first..first + count`; else the children are the next node and `first`.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     low: [f64; 3],
@@ -21,22 +23,47 @@ struct Node {
 }
 
 /// Triangles in a leaf.
-const LEAF: usize = 4;
+const LEAF: usize = 8;
 
 impl Surface {
     /// Builds the hierarchy over triangles given by their corners.
-    pub fn new(mut triangles: Vec<[[f64; 3]; 3]>) -> Self {
-        let mut nodes = Vec::with_capacity(triangles.len());
-        if !triangles.is_empty() {
-            nodes.push(bounds(&triangles, 0));
-            build(&mut triangles, 0, &mut nodes, 0);
+    pub fn new(triangles: &[[[f64; 3]; 3]]) -> Self {
+        let mut items: Vec<Item> = triangles.iter().zip(0..).map(|(t, index)| Item::new(t, index)).collect();
+        let mut nodes = Vec::with_capacity(triangles.len().div_ceil(LEAF) * 2);
+        if !items.is_empty() {
+            split(&mut items, 0, &mut nodes);
         }
-        Self { triangles, nodes }
+        let mut out = Self { triangles: items.iter().map(|item| triangles[item.index as usize]).collect(), nodes };
+        out.set_bounds();
+        out
     }
 
     /// Whether there is nothing to be near to.
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
+    }
+
+    /// From leaves to root: children come after their parents.
+    fn set_bounds(&mut self) {
+        for index in (0..self.nodes.len()).rev() {
+            let node = self.nodes[index];
+            let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+            let mut include = |p: &[f64; 3], q: &[f64; 3]| {
+                for i in 0..3 {
+                    low[i] = if p[i] < low[i] { p[i] } else { low[i] };
+                    high[i] = if q[i] > high[i] { q[i] } else { high[i] };
+                }
+            };
+            if node.count == 0 {
+                for child in [index + 1, node.first as usize] {
+                    include(&self.nodes[child].low, &self.nodes[child].high);
+                }
+            } else {
+                let leaf = &self.triangles[node.first as usize..(node.first + node.count) as usize];
+                leaf.iter().flatten().for_each(|p| include(p, p));
+            }
+            (self.nodes[index].low, self.nodes[index].high) = (low, high);
+        }
     }
 
     /// Squared distance from `p` to the surface if it is above `least_squared`, else some value not above that.
@@ -61,7 +88,7 @@ impl Surface {
                 }
                 continue;
             }
-            let (a, b) = (node.first, node.first + 1);
+            let (a, b) = (index + 1, node.first);
             let near_a = self.nodes[a as usize].squared_distance(p);
             let near_b = self.nodes[b as usize].squared_distance(p);
             let (first, second) = if near_b < near_a { ((b, near_b), (a, near_a)) } else { ((a, near_a), (b, near_b)) };
@@ -85,36 +112,51 @@ impl Node {
     }
 }
 
-fn bounds(triangles: &[[[f64; 3]; 3]], first: usize) -> Node {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for p in triangles.iter().flatten() {
-        for i in 0..3 {
-            low[i] = low[i].min(p[i]);
-            high[i] = high[i].max(p[i]);
-        }
-    }
-    Node { low, high, first: first as u32, count: triangles.len() as u32 }
+/// A triangle while it looks for its place: sum of its corners, and its number.
+#[derive(Clone, Copy)]
+struct Item {
+    sum: [f32; 3],
+    index: u32,
 }
 
-/// Splits `node` (over all of `triangles`, which start at `first`) at the median of its longest axis. Halving keeps
-/// the depth under 32, so that a fixed stack of 64 entries is enough for any search.
-fn build(triangles: &mut [[[f64; 3]; 3]], first: usize, nodes: &mut Vec<Node>, node: usize) {
-    if triangles.len() <= LEAF {
+impl Item {
+    fn new(t: &[[f64; 3]; 3], index: u32) -> Self {
+        Self { sum: [0, 1, 2].map(|i| (t[0][i] + t[1][i] + t[2][i]) as f32), index }
+    }
+}
+
+/// Bits that order as the number does.
+#[inline]
+fn ordered(x: f32) -> u32 {
+    let bits = x.to_bits();
+    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
+}
+
+/// Splits `items`, which start at `first`, at the median of the longest axis of their sums, as often as needed; adds the
+/// nodes without bounds. Halving keeps the depth under 32, so that a fixed stack of 64 entries is enough for any search.
+fn split(items: &mut [Item], first: usize, nodes: &mut Vec<Node>) {
+    let node = nodes.len();
+    nodes.push(Node { low: [0.0; 3], high: [0.0; 3], first: first as u32, count: items.len() as u32 });
+    if items.len() <= LEAF {
         return;
     }
-    let Node { low, high, .. } = nodes[node];
-    let extent = sub(high, low);
+    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for item in items.iter() {
+        for i in 0..3 {
+            low[i] = if item.sum[i] < low[i] { item.sum[i] } else { low[i] };
+            high[i] = if item.sum[i] > high[i] { item.sum[i] } else { high[i] };
+        }
+    }
+    let extent = [0, 1, 2].map(|i| high[i] - low[i]);
     let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0);
-    let middle = triangles.len() / 2;
-    let key = |t: &[[f64; 3]; 3]| t[0][axis] + t[1][axis] + t[2][axis];
-    triangles.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b)));
-    let (left, right) = triangles.split_at_mut(middle);
-    let child = nodes.len();
-    nodes.push(bounds(left, first));
-    nodes.push(bounds(right, first + middle));
-    (nodes[node].first, nodes[node].count) = (child as u32, 0);
-    build(left, first, nodes, child);
-    build(right, first + middle, nodes, child + 1);
+    let middle = items.len() / 2;
+    items.select_nth_unstable_by_key(middle, |item| u64::from(ordered(item.sum[axis])) << 32 | u64::from(item.index));
+    let (left, right) = items.split_at_mut(middle);
+    nodes[node].count = 0;
+    // The first child follows its parent.
+    split(left, first, nodes);
+    nodes[node].first = nodes.len() as u32;
+    split(right, first + middle, nodes);
 }
 
 /// C. Ericson, *Real-Time Collision Detection*, 2005, section 5.1.5: the region of the triangle's plane decides.
@@ -183,7 +225,7 @@ mod tests {
 
     #[test]
     fn distances_to_a_square_are_the_closed_form() {
-        let surface = Surface::new(square(9));
+        let surface = Surface::new(&square(9));
         for (p, want) in [
             ([0.5, 0.5, 2.0], 2.0),
             ([0.31, 0.77, 0.0], 0.0),
@@ -206,7 +248,7 @@ mod tests {
         };
         let triangles: Vec<[[f64; 3]; 3]> =
             (0..300).map(|_| std::array::from_fn(|_| std::array::from_fn(|_| next()))).collect();
-        let surface = Surface::new(triangles.clone());
+        let surface = Surface::new(&triangles);
         for _ in 0..200 {
             let p = [next() * 3.0, next() * 3.0, next() * 3.0];
             let want = triangles.iter().map(|t| squared_distance_to_triangle(p, t)).fold(f64::INFINITY, f64::min);
@@ -216,10 +258,10 @@ mod tests {
 
     #[test]
     fn largest_distance_finds_the_one_far_point() {
-        let surface = Surface::new(square(4));
+        let surface = Surface::new(&square(4));
         let points = (0..100).map(|i| [0.5, 0.5, if i == 57 { 0.25 } else { 0.01 }]);
         assert!((largest_distance(points, &surface, 0.0) - 0.25).abs() < 1e-12);
         assert_eq!(largest_distance(std::iter::empty(), &surface, 0.125), 0.125);
-        assert_eq!(largest_distance(std::iter::once([0.0; 3]), &Surface::new(Vec::new()), 0.0), f64::INFINITY);
+        assert_eq!(largest_distance(std::iter::once([0.0; 3]), &Surface::new(&[]), 0.0), f64::INFINITY);
     }
 }
