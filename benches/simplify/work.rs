@@ -88,7 +88,7 @@ fn own(mesh: &Mesh, memoryless: bool) -> Report {
     let sequence = simplify(mesh, &settings);
     let simplified = now();
     let part = Part { mesh, sequence: Some(&sequence), shareable: false };
-    let chain = chain(&[part], &settings_of_chain);
+    let chain = chain(&[part], &settings_of_chain, None);
     let chained = now();
     let levels = chain.levels.iter().map(|level| (level.triangles, level.error / frame(&mesh.primitives).1)).collect();
     let measure = measure(mesh, &sequence);

@@ -182,6 +182,9 @@ impl Package {
     /// The files, for a main file called `stem` plus the container's extension. `added` is what `add_levels` created;
     /// `buffers` are the source document's.
     pub fn finish(mut self, stem: &str, added: Option<NewBuffer>, buffers: &Buffers) -> Result<Files, WriteError> {
+        // The BIN chunk of a GLB that became a `.gltf`, and the levels behind it, are one file.
+        let hosted = added.as_ref().filter(|buffer| 0 < buffer.behind).map(|buffer| buffer.index);
+        let ending = if self.written.iter().any(|w| Some(w.index) == hosted) { "bin" } else { "lod.bin" };
         let added = added.map(|buffer| self.join(buffer, buffers));
         let mut taken: BTreeSet<String> =
             self.dependencies.iter().filter_map(|d| Some(d.path.file_name()?.to_str()?.to_lowercase())).collect();
@@ -193,7 +196,7 @@ impl Package {
             if self.keeps_buffers_inside()? {
                 self.document.array_mut("buffers")?[buffer.index]["uri"] = json!(data_uri(&buffer.bytes));
             } else {
-                beside.push(self.address(buffer, stem, "lod.bin", &mut taken)?);
+                beside.push(self.address(buffer, stem, ending, &mut taken)?);
                 self.forget_unused();
             }
         }
@@ -209,7 +212,7 @@ impl Package {
         if buffer.behind == 0 {
             return buffer;
         }
-        // A buffer of this package that waits to be written (the BIN chunk of a GLB) becomes part of the other.
+        // What waits to be written becomes part of it.
         self.written.retain(|written| written.index != buffer.index);
         let mut bytes = buffers.bytes(buffer.index).unwrap_or_default().to_vec();
         bytes.resize(buffer.behind, 0);
