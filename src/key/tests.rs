@@ -135,9 +135,9 @@ fn what_is_not_used_is_not_in_the_key() {
 #[test]
 fn the_key_is_the_same_on_every_machine() {
     let [sequence, chain, scene] = keys(&settings(""), MeshParts::ALL);
-    insta::assert_snapshot!(sequence, @"c9458ef1b2f80d325c4e2704f73e46574ca2a4726416dda56c16a17b04bfafc9");
-    insta::assert_snapshot!(chain, @"3280673de86b402d8019e5d33ba5eea78f06ecfb7093ff39106ea0c0a4ca8d4e");
-    insta::assert_snapshot!(scene, @"594ff6153e0425e5396a9c57035e68213a3cd1371816597d6892793be5be9c14");
+    insta::assert_snapshot!(sequence, @"fbcc73903254ebba4686fc840b9e93bb0ae6930bbf969dfd3efc94f4052027e2");
+    insta::assert_snapshot!(chain, @"2d3001ca18278a72f78d56ee76bea43fda8098f240ef18fe99ee3051854e0819");
+    insta::assert_snapshot!(scene, @"8e8aed992da120b18c9ec79d241bf1b0e61436def5c270a1474248f536f423cf");
     assert_eq!(sequence.to_string().parse(), Ok(sequence));
     assert!("x".parse::<JobKey>().is_err());
 }

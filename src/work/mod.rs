@@ -147,12 +147,12 @@ fn recorded<'a>(
 }
 
 fn parts<'a>(tasks: &'a [PartTask], sequences: &[Option<&'a Progressive>]) -> Vec<Part<'a>> {
-    let part = |(task, sequence): (&'a PartTask, &Option<&'a Progressive>)| Part {
+    let part = |(task, sequence): (&'a PartTask, Option<&'a Progressive>)| Part {
         mesh: &task.mesh,
-        sequence: *sequence,
+        sequence,
         shareable: task.shareable,
     };
-    tasks.iter().zip(sequences).map(part).collect()
+    tasks.iter().zip(sequences.iter().copied()).map(part).collect()
 }
 
 /// Notes in every level what made it, where there was a choice.
