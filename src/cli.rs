@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::command::failure::{Failure, UsageError};
-use crate::command::{CacheChoice, Context, Exit, bake, cache, completions, evaluate, explain, init, inspect, schema};
+use crate::command::{
+    CacheChoice, Context, Exit, bake, cache, completions, evaluate, explain, init, inspect, schema, study,
+};
 use crate::progress::{JsonLines, Lines, Paint, Reporter, Terminal, Verbosity};
 
 /// The pipeline that a bare `lodbake` bakes.
@@ -88,10 +90,16 @@ enum Command {
     Evaluate(evaluate::Evaluate),
     /// Tell why a scene would be baked again
     Explain(explain::Explain),
+    /// Compare ways to simplify: looks, distance, time and memory
+    Study(study::Study),
     /// Look after the cache
     Cache(cache::CacheCommand),
     /// Write the JSON schema of a file format to standard output
     Schema(schema::Schema),
+    #[command(hide = true)]
+    Measured(study::Measured),
+    #[command(hide = true)]
+    StudyLevel(study::StudyLevel),
     /// Write completions for a shell to standard output
     Completions(completions::Completions),
 }
@@ -115,6 +123,9 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> Exit {
         Command::Evaluate(command) => command.run(&context),
         Command::Explain(command) => command.run(&context),
         Command::Cache(command) => command.run(&context),
+        Command::Study(command) => command.run(&context),
+        Command::Measured(command) => command.run(&context),
+        Command::StudyLevel(command) => command.run(&context),
         Command::Schema(command) => command.run(&context),
         Command::Inspect(command) => command.run(&context),
         Command::Completions(command) => command.run(Cli::command(), &context),

@@ -15,5 +15,7 @@ mod explain;
 mod init;
 #[path = "e2e/inspect.rs"]
 mod inspect;
+#[path = "e2e/study.rs"]
+mod study;
 #[path = "e2e/usage.rs"]
 mod usage;

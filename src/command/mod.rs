@@ -12,6 +12,7 @@ pub mod failure;
 pub mod init;
 pub mod inspect;
 pub mod schema;
+pub mod study;
 
 use std::io::{self, Write};
 use std::num::NonZeroUsize;

@@ -1,7 +1,7 @@
 //! `lodbake schema KIND`: the JSON schema of a file that lodbake reads or writes, for editors and other programs.
 
 use super::{Context, Exit};
-use crate::{config, evaluation, progress, report};
+use crate::{config, evaluation, progress, report, study};
 
 /// Write the JSON schema of a file format
 #[derive(Clone, Debug, clap::Args)]
@@ -24,6 +24,10 @@ enum Kind {
     Inspection,
     /// `lodbake evaluate --json REFERENCE CANDIDATE`
     Evaluation,
+    /// `study.toml`
+    Study,
+    /// `lodbake study --json`
+    StudyRecord,
 }
 
 impl Schema {
@@ -35,6 +39,8 @@ impl Schema {
             Kind::Events => progress::schema(),
             Kind::Evaluation => evaluation::schema(),
             Kind::Inspection => report::inspection::schema(),
+            Kind::Study => study::schema(),
+            Kind::StudyRecord => study::record_schema(),
         };
         context.print(&format!("{schema:#}\n"))?;
         Ok(Exit::Fine)

@@ -1,19 +1,18 @@
-//! Checks a document against the schema: unknown keys and names, wrong kinds, values out of range, absent keys.
+//! Checks a TOML document against a schema: unknown keys and names, wrong kinds, values out of range, absent keys.
 //!
 //! The schema is the one that editors get, so that an editor and lodbake never disagree. Knows no key by name.
 
 use std::ops::Range;
 
-use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{ConfigError, Names, Place, Step};
-use super::file::PipelineFile;
 
 /// A parsed document that remembers where everything stands.
-pub(super) struct Document<'a> {
+pub struct Document<'a> {
     file: &'a str,
     text: &'a str,
     root: Spanned<DeTable<'a>>,
@@ -30,9 +29,9 @@ impl<'a> Document<'a> {
     }
 
     /// The typed form.
-    pub fn typed(&self) -> Result<PipelineFile, ConfigError> {
+    pub fn typed<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {
         let deserializer = toml::de::Deserializer::from(self.root.clone());
-        PipelineFile::deserialize(deserializer).map_err(|error| syntax(self.file, self.text, &error))
+        T::deserialize(deserializer).map_err(|error| syntax(self.file, self.text, &error))
     }
 
     /// An error about the value at `place`; the line is that of the innermost part of `place` that exists.

@@ -13,11 +13,11 @@ pub(super) enum Step {
 }
 
 impl Place {
-    pub(super) fn key(&self, key: &str) -> Self {
+    pub(crate) fn key(&self, key: &str) -> Self {
         self.with(Step::Key(key.to_owned()))
     }
 
-    pub(super) fn index(&self, index: usize) -> Self {
+    pub(crate) fn index(&self, index: usize) -> Self {
         self.with(Step::Index(index))
     }
 
@@ -55,7 +55,7 @@ pub struct Names {
 }
 
 impl Names {
-    pub(super) fn near(written: &str, known: Vec<String>) -> Self {
+    pub(crate) fn near(written: &str, known: Vec<String>) -> Self {
         let nearest = known
             .iter()
             .map(|name| (strsim::normalized_damerau_levenshtein(written, name), name))

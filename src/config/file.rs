@@ -13,7 +13,7 @@ use super::defaults;
 /// A string or a list of strings.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
-pub(super) enum OneOrMany {
+pub(crate) enum OneOrMany {
     /// One.
     One(#[schemars(length(min = 1))] String),
     /// Several.
@@ -21,7 +21,7 @@ pub(super) enum OneOrMany {
 }
 
 impl OneOrMany {
-    pub(super) fn into_vec(self) -> Vec<String> {
+    pub(crate) fn into_vec(self) -> Vec<String> {
         match self {
             Self::One(one) => vec![one],
             Self::Many(many) => many,
@@ -121,7 +121,7 @@ pub(super) struct ScreenTable {
 /// How meshes are simplified. Weights are relative to the geometric error, which has weight 1; 0 leaves a part out.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct SimplifyTable {
+pub(crate) struct SimplifyTable {
     /// What the contraction of an edge costs. Default: its.
     #[schemars(extend("default" = Metric::default()))]
     pub metric: Option<Metric>,
@@ -264,7 +264,12 @@ pub(super) struct OverrideEntry {
 
 /// The JSON schema of `pipeline.toml`, for editors and for the checks of this room.
 pub fn schema() -> Value {
-    let mut schema = schemars::schema_for!(PipelineFile).to_value();
+    schema_of::<PipelineFile>()
+}
+
+/// The JSON schema of a configuration file.
+pub(crate) fn schema_of<T: JsonSchema>() -> Value {
+    let mut schema = schemars::schema_for!(T).to_value();
     drop_null(&mut schema);
     schema
 }

@@ -4,11 +4,11 @@
 //! rules between keys are applied (`resolve.rs`), and [`Pipeline::settings_for`] lays overrides over each other for one
 //! scene. Reads that one file; knows nothing of scenes, meshes or the cache.
 
-mod check;
+pub(crate) mod check;
 mod choice;
 pub mod defaults;
 mod error;
-mod file;
+pub(crate) mod file;
 mod globs;
 mod resolve;
 mod settings;

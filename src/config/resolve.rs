@@ -96,9 +96,16 @@ impl Layer {
     }
 }
 
+impl SceneSettings {
+    /// The defaults, but for what `[simplify]` says.
+    pub(crate) fn simplified_by(simplify: &SimplifyTable) -> Self {
+        Layer { simplify: simplify.clone(), ..Layer::default() }.settle()
+    }
+}
+
 /// The whole pipeline; `file` is its path.
 pub(super) fn pipeline(document: &Document<'_>, file: &str) -> Result<Pipeline, ConfigError> {
-    let typed = document.typed()?;
+    let typed: PipelineFile = document.typed()?;
     let base = Path::new(file).parent().unwrap_or(Path::new("")).to_path_buf();
     let top = Place::default();
     let (inputs, output) = folders(document, &typed, &base)?;

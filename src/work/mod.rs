@@ -84,6 +84,17 @@ pub fn work(plan: &Plan, cache: &Cache, load: LoadLooks, reporter: &dyn Reporter
     out
 }
 
+/// Makes every chain of `plan` in this thread, keeping nothing: for measuring. Pictures are drawn in rayon's pool.
+pub fn chains(plan: &Plan, load: LoadLooks) -> BTreeMap<JobKey, Chain> {
+    let sequences: BTreeMap<JobKey, Progressive> =
+        plan.sequences.iter().map(|(&key, task)| (key, simplify(&task.mesh, &task.settings))).collect();
+    let cut = |task: &ChainTask| {
+        let looks = task.judged.as_ref().map(|look| load(look.scene));
+        cut(task, &sequences, looks.as_ref())
+    };
+    plan.chains.iter().map(|(&key, task)| (key, cut(task))).collect()
+}
+
 /// Groups of one scene each, in the order of their scenes.
 fn by_scene<T>(mut tasks: Vec<T>, scene: impl Fn(&T) -> usize) -> Vec<Vec<T>> {
     tasks.sort_by_key(&scene);
