@@ -29,11 +29,8 @@ pub(super) fn find(document: &Document, anchors: &BTreeSet<usize>) -> Result<Opt
         let meshes = index(node, "mesh").and_then(|mesh| finder.meshes.get(mesh));
         let skin = index(node, "skin").and_then(|skin| finder.skins.get(skin));
         let of_mesh = meshes.map_or_else(BTreeSet::new, |mesh| finder.mesh(mesh));
-        if anchors.contains(&i) {
-            put_off.extend(of_mesh)
-        } else {
-            needed.extend(of_mesh)
-        }
+        let list = if anchors.contains(&i) { &mut put_off } else { &mut needed };
+        list.extend(of_mesh);
         needed.extend(skin.and_then(|skin| finder.accessor(index(skin, "inverseBindMatrices"))));
     }
     for animation in document.array("animations")? {
