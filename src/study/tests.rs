@@ -113,7 +113,7 @@ fn mistakes_are_told_with_their_line() {
         (&format!("{HEAD}{OWN}{OWN}"), "`study.toml` line 8: algorithm[1].name `its` is taken"),
         (
             &format!("{HEAD}[[algorithm]]\nname = \"a\"\nsimplify = {{ metric = \"qen\" }}\n"),
-            "unknown algorithm[0].simplify.metric `qen` in `study.toml` line 6 (did you mean `qem`? known: `its`, `qem`)",
+            "unknown algorithm[0].simplify.metric `qen` in `study.toml` line 6 (did you mean `qem`? known: `its`, `qem`, `auto`)",
         ),
         (
             &format!("{HEAD}[[algorithm]]\nname = \"a\"\ncommand = \"x {{in}} {{output}}\"\n"),
