@@ -65,6 +65,7 @@ async function load(url, options) {
   SceneLoader.OnPluginActivatedObservable.addOnce((plugin) => {
     // Asked for now: a file without images can be complete before the scene is handed over, and it is told only once.
     complete = plugin.whenCompleteAsync();
+    complete.catch(() => {}); // a file that does not load is told by AppendSceneAsync
     plugin.onExtensionLoadedObservable.add((extension) => {
       if (extension.name !== 'MSFT_lod') return;
       extension.onNodeLODsLoadedObservable.add((level) => (arrived = Math.max(arrived, level + 1)));
