@@ -111,7 +111,8 @@ impl Study {
         let top = Place::default();
         let folder = Path::new(file).parent().unwrap_or(Path::new("")).to_path_buf();
         let targets = targets(&document, &typed)?;
-        let meshes = meshes(&document, &folder, &typed.meshes)?;
+        let output = folder.join(&typed.output);
+        let meshes = meshes(&document, &folder, &output, &typed.meshes)?;
         let algorithms = algorithms(&document, &typed)?;
         let baseline = match &typed.baseline {
             None => 0,
@@ -119,7 +120,7 @@ impl Study {
         };
         Ok(Self {
             file: file.to_owned(),
-            output: folder.join(&typed.output),
+            output,
             folder,
             meshes,
             targets,
@@ -159,16 +160,22 @@ fn targets(document: &Document<'_>, typed: &StudyFile) -> Result<Vec<Target>, Co
     Ok(all)
 }
 
-/// Entries are files, or globs that match at least one.
-fn meshes(document: &Document<'_>, folder: &Path, entries: &OneOrMany) -> Result<Vec<MeshFile>, ConfigError> {
+/// Entries are files, or globs that match at least one outside `output`: what an earlier study wrote is no source.
+fn meshes(
+    document: &Document<'_>,
+    folder: &Path,
+    output: &Path,
+    entries: &OneOrMany,
+) -> Result<Vec<MeshFile>, ConfigError> {
     let many = matches!(entries, OneOrMany::Many(_));
     let mut paths: Vec<PathBuf> = Vec::new();
     for (i, entry) in entries.clone().into_vec().into_iter().enumerate() {
         let key = Place::default().key("meshes");
         let place = if many { key.index(i) } else { key };
-        let found = if is_glob(&entry) {
-            matching(folder, &entry)
-                .map_err(|cause| document.invalid(&place, format!("`{entry}` is not a glob: {cause}")))?
+        let found: Vec<PathBuf> = if is_glob(&entry) {
+            let found = matching(folder, &entry)
+                .map_err(|cause| document.invalid(&place, format!("`{entry}` is not a glob: {cause}")))?;
+            found.into_iter().filter(|path| !path.starts_with(output)).collect()
         } else {
             vec![folder.join(&entry)].into_iter().filter(|path| path.is_file()).collect()
         };

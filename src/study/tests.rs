@@ -11,12 +11,17 @@ use crate::config::{Effort, Metric};
 /// A folder with two meshes of the same name.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    for name in ["meshes/duck/model.glb", "meshes/fox/model.gltf", "meshes/fox/notes.txt", "one.glb"] {
+    for name in [
+        "studies/out/levels/old.glb",
+        "meshes/duck/model.glb",
+        "meshes/fox/model.gltf",
+        "meshes/fox/notes.txt",
+        "one.glb",
+    ] {
         let path = folder.path().join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, "").unwrap();
     }
-    std::fs::create_dir(folder.path().join("studies")).unwrap();
     folder
 }
 
@@ -112,8 +117,8 @@ fn mistakes_are_told_with_their_line() {
         ),
         (&format!("{HEAD}{OWN}{OWN}"), "`study.toml` line 8: algorithm[1].name `its` is taken"),
         (
-            &format!("{HEAD}[[algorithm]]\nname = \"a\"\nsimplify = {{ metric = \"qen\" }}\n"),
-            "unknown algorithm[0].simplify.metric `qen` in `study.toml` line 6 (did you mean `qem`? known: `its`, `qem`, `auto`)",
+            &format!("{HEAD}[[algorithm]]\nname = \"a\"\nsimplify = {{ placement = \"subse\" }}\n"),
+            "unknown algorithm[0].simplify.placement `subse` in `study.toml` line 6 (did you mean `subset`? known: `auto`, `optimal`, `subset`)",
         ),
         (
             &format!("{HEAD}[[algorithm]]\nname = \"a\"\ncommand = \"x {{in}} {{output}}\"\n"),
@@ -152,6 +157,17 @@ fn mistakes_are_told_with_their_line() {
     ] {
         assert_eq!(parse(folder.path(), &ratios(list)).unwrap_err(), told, "{list}");
     }
+}
+
+#[test]
+fn levels_of_an_earlier_study_are_no_sources() {
+    let folder = folder();
+    let study = |output: &str| {
+        let head = format!("meshes = \"**/*.glb\"\noutput = \"{output}\"\nratios = [0.5]\n");
+        parse(folder.path(), &format!("{head}{OWN}"))
+    };
+    assert_eq!(study("elsewhere").unwrap().meshes.len(), 1);
+    assert!(study("./out").unwrap_err().contains("matches no file"));
 }
 
 #[test]

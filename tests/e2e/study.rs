@@ -94,6 +94,10 @@ fn a_failing_competitor_is_a_row() {
     let run = space.run(&["study", "--json"]);
     assert_eq!(run.code, 3, "{run:#?}");
     let record = run.document();
+    let schema = space.run_fine(&["schema", "study-record"]).document();
+    let validator = jsonschema::validator_for(&schema).expect("it is a schema");
+    let wrong: Vec<String> = validator.iter_errors(&record).map(|error| error.to_string()).collect();
+    assert_eq!(wrong, Vec::<String>::new());
     let algorithms = record["algorithms"].as_array().expect("it is a list");
     let errors: BTreeMap<&str, &str> = record["cells"]
         .as_array()
