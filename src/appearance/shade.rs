@@ -10,7 +10,6 @@ use super::looks::Looks;
 use super::material::{Alpha, Material, TextureUse};
 use super::raster::{Setup, Weights};
 use super::srgb::Srgb;
-use super::texture::Texture;
 use glam::{DMat3, DMat4, DVec3, Mat3, Vec2, Vec3, Vec4};
 use std::sync::LazyLock;
 
@@ -77,11 +76,52 @@ pub struct Shader<'a> {
     pub srgb: Srgb,
 }
 
+/// One pixel of one triangle.
+struct Pixel<'a> {
+    part: &'a Part,
+    setup: &'a Setup,
+    weights: Weights,
+    /// Texture coordinates of set 0, which most materials use alone.
+    first: Option<Laid>,
+}
+
+/// Texture coordinates at a pixel and their change for one pixel to the right and up.
+#[derive(Clone, Copy)]
+struct Laid {
+    at: Vec2,
+    dx: Vec2,
+    dy: Vec2,
+}
+
+impl<'a> Pixel<'a> {
+    fn new(part: &'a Part, setup: &'a Setup, x: i32, y: i32) -> Self {
+        let mut pixel = Self { part, setup, weights: setup.weights(x, y), first: None };
+        pixel.first = pixel.lay(0);
+        pixel
+    }
+
+    /// The texture coordinates of the corners; a part need not have them.
+    fn corners(&self, set: usize) -> Option<[Vec2; 3]> {
+        let set = self.part.uvs.get(set).filter(|set| !set.is_empty())?;
+        Some(self.setup.corners.map(|i| set[i as usize]))
+    }
+
+    fn lay(&self, set: usize) -> Option<Laid> {
+        let corners = self.corners(set)?;
+        let (dx, dy) = self.weights.slope(corners);
+        Some(Laid { at: mix(corners, self.weights.at), dx, dy })
+    }
+
+    fn laid(&self, set: usize) -> Option<Laid> {
+        if set == 0 { self.first } else { self.lay(set) }
+    }
+}
+
 impl Shader<'_> {
     /// Is a surface with holes solid in a pixel?
     pub fn passes(&self, part: &Part, setup: &Setup, x: i32, y: i32) -> bool {
         let material = &self.looks.materials[part.material];
-        let alpha = || self.base(material, part, setup, &setup.weights(x, y)).w;
+        let alpha = || self.base(material, &Pixel::new(part, setup, x, y)).w;
         match material.alpha {
             Alpha::Opaque => true,
             Alpha::Mask(cutoff) => alpha() >= cutoff,
@@ -92,63 +132,43 @@ impl Shader<'_> {
     /// The colour of a pixel, sRGB.
     pub fn color(&self, part: &Part, placed: &Placed, setup: &Setup, x: i32, y: i32) -> [u8; 3] {
         let material = &self.looks.materials[part.material];
-        let weights = setup.weights(x, y);
-        let base = self.base(material, part, setup, &weights).truncate();
-        let light = if material.unlit { base } else { self.lit(material, base, part, placed, setup, &weights) };
+        let pixel = Pixel::new(part, setup, x, y);
+        let base = self.base(material, &pixel).truncate();
+        let light = if material.unlit { base } else { self.lit(material, base, placed, &pixel) };
         light.to_array().map(|c| self.srgb.byte(c))
     }
 
     /// Base colour and alpha.
-    fn base(&self, material: &Material, part: &Part, setup: &Setup, weights: &Weights) -> Vec4 {
+    fn base(&self, material: &Material, pixel: &Pixel<'_>) -> Vec4 {
         let mut base = material.base;
-        if let Some(colors) = &part.colors {
-            base *= mix(setup.corners.map(|i| colors[i as usize]), weights.at);
+        if let Some(colors) = &pixel.part.colors {
+            base *= mix(pixel.setup.corners.map(|i| colors[i as usize]), pixel.weights.at);
         }
-        if let Some(value) = self.texture(material.base_texture.as_ref(), part, setup, weights) {
+        if let Some(value) = self.texture(material.base_texture.as_ref(), pixel) {
             base *= value;
         }
         base
     }
 
-    fn texture(&self, used: Option<&TextureUse>, part: &Part, setup: &Setup, weights: &Weights) -> Option<Vec4> {
-        let (used, texture, uv) = self.laid(used, part, setup)?;
-        let (dx, dy) = weights.slope(uv);
-        let (dx, dy) = (used.direction(dx), used.direction(dy));
-        let at = used.point(mix(uv, weights.at));
-        Some(texture.sample(self.srgb, at, dx, dy, used.wrap))
-    }
-
-    /// A texture with the coordinates of the corners. A part without those coordinates shows no texture.
-    fn laid<'t>(
-        &'t self,
-        used: Option<&'t TextureUse>,
-        part: &Part,
-        setup: &Setup,
-    ) -> Option<(&'t TextureUse, &'t Texture, [Vec2; 3])> {
+    /// The value of a texture; none without one or without coordinates for it.
+    fn texture(&self, used: Option<&TextureUse>, pixel: &Pixel<'_>) -> Option<Vec4> {
         let used = used?;
-        let set = part.uvs.get(used.set).filter(|set| !set.is_empty())?;
-        Some((used, &self.looks.textures[used.texture], setup.corners.map(|i| set[i as usize])))
+        let Laid { at, dx, dy } = pixel.laid(used.set)?;
+        let (dx, dy) = (used.direction(dx), used.direction(dy));
+        Some(self.looks.textures[used.texture].sample(self.srgb, used.point(at), dx, dy, used.wrap))
     }
 
-    fn lit(
-        &self,
-        material: &Material,
-        base: Vec3,
-        part: &Part,
-        placed: &Placed,
-        setup: &Setup,
-        weights: &Weights,
-    ) -> Vec3 {
-        let positions = setup.corners.map(|i| part.positions[i as usize]);
-        let at = placed.transform.transform_point3(mix(positions, weights.at).as_dvec3());
+    fn lit(&self, material: &Material, base: Vec3, placed: &Placed, pixel: &Pixel<'_>) -> Vec3 {
+        let positions = pixel.setup.corners.map(|i| pixel.part.positions[i as usize]);
+        let at = placed.transform.transform_point3(mix(positions, pixel.weights.at).as_dvec3());
         let view = (self.eye - at).as_vec3().normalize_or_zero();
-        let mut normal = self.normal(material, part, placed, setup, weights, positions);
-        if setup.back {
+        let mut normal = self.normal(material, placed, pixel, positions);
+        if pixel.setup.back {
             normal = -normal;
         }
         let facing = normal.dot(view).clamp(0.0, 1.0);
         let (mut metallic, mut roughness) = (material.metallic, material.roughness);
-        if let Some(value) = self.texture(material.metallic_roughness_texture.as_ref(), part, setup, weights) {
+        if let Some(value) = self.texture(material.metallic_roughness_texture.as_ref(), pixel) {
             metallic *= value.z;
             roughness *= value.y;
         }
@@ -158,40 +178,28 @@ impl Shader<'_> {
         let mut light = diffuse * (LAMP * facing + EVEN) + specular * (LAMP * highlight(facing, roughness));
         let (scale, bias) = surround(facing, roughness);
         light += (specular * scale + Vec3::splat(bias)) * EVEN;
-        light += self.emission(material, part, setup, weights);
+        light += self.emission(material, pixel);
         light
     }
 
-    fn emission(&self, material: &Material, part: &Part, setup: &Setup, weights: &Weights) -> Vec3 {
+    fn emission(&self, material: &Material, pixel: &Pixel<'_>) -> Vec3 {
         if material.emissive == Vec3::ZERO {
             return Vec3::ZERO;
         }
-        let texture = self.texture(material.emissive_texture.as_ref(), part, setup, weights);
+        let texture = self.texture(material.emissive_texture.as_ref(), pixel);
         texture.map_or(material.emissive, |value| material.emissive * value.truncate())
     }
 
     /// The shading normal in world space, a unit vector, outward.
-    fn normal(
-        &self,
-        material: &Material,
-        part: &Part,
-        placed: &Placed,
-        setup: &Setup,
-        weights: &Weights,
-        positions: [Vec3; 3],
-    ) -> Vec3 {
-        let smooth = mix(setup.corners.map(|i| part.normals[i as usize]), weights.at);
+    fn normal(&self, material: &Material, placed: &Placed, pixel: &Pixel<'_>, positions: [Vec3; 3]) -> Vec3 {
+        let smooth = mix(pixel.setup.corners.map(|i| pixel.part.normals[i as usize]), pixel.weights.at);
         let normal = (placed.normal * smooth).normalize_or_zero();
         if normal == Vec3::ZERO {
-            return flat(placed, setup, positions);
+            return flat(placed, pixel.setup, positions);
         }
-        let Some((used, texture, uv)) = self.laid(material.normal_texture.as_ref(), part, setup) else { return normal };
-        let Some((tangent, bitangent)) = tangents(part, placed, setup, weights, smooth, positions, (used, uv)) else {
-            return normal;
-        };
-        let (dx, dy) = weights.slope(uv);
-        let at = used.point(mix(uv, weights.at));
-        let value = texture.sample(self.srgb, at, used.direction(dx), used.direction(dy), used.wrap);
+        let used = material.normal_texture.as_ref();
+        let Some((used, value)) = used.zip(self.texture(used, pixel)) else { return normal };
+        let Some((tangent, bitangent)) = tangents(placed, pixel, smooth, positions, used) else { return normal };
         let bump = value.truncate() * 2.0 - Vec3::ONE;
         let bump = Vec3::new(bump.x * material.normal_scale, bump.y * material.normal_scale, bump.z);
         let bent = (tangent * bump.x + bitangent * bump.y + normal * bump.z).normalize_or_zero();
@@ -209,19 +217,18 @@ fn flat(placed: &Placed, setup: &Setup, [a, b, c]: [Vec3; 3]) -> Vec3 {
 /// Unit tangent and bitangent in world space: those of the vertices, else along the texture's axes, whose v points
 /// down while a normal map's y points up. `None` where the texture is laid on without extent.
 fn tangents(
-    part: &Part,
     placed: &Placed,
-    setup: &Setup,
-    weights: &Weights,
+    pixel: &Pixel<'_>,
     normal: Vec3,
     [a, b, c]: [Vec3; 3],
-    (used, uv): (&TextureUse, [Vec2; 3]),
+    used: &TextureUse,
 ) -> Option<(Vec3, Vec3)> {
-    let (tangent, bitangent) = if let Some(tangents) = &part.tangents {
-        let corners = setup.corners.map(|i| tangents[i as usize]);
-        let tangent = mix(corners, weights.at).truncate();
+    let (tangent, bitangent) = if let Some(tangents) = &pixel.part.tangents {
+        let corners = pixel.setup.corners.map(|i| tangents[i as usize]);
+        let tangent = mix(corners, pixel.weights.at).truncate();
         (tangent, normal.cross(tangent) * corners[0].w)
     } else {
+        let uv = pixel.corners(used.set)?;
         let (p, q) = (b - a, c - a);
         let (s, t) = (used.direction(uv[1] - uv[0]), used.direction(uv[2] - uv[0]));
         let area = s.perp_dot(t);

@@ -27,12 +27,22 @@ pub enum Wrap {
 }
 
 impl Wrap {
-    /// A texel number that may lie outside to one inside `0..size`.
+    /// A texel number and the next one, inside `0..size`.
     #[inline]
+    fn pair(self, at: i32, size: i32) -> (usize, usize) {
+        if 0 <= at && at + 1 < size {
+            return (at as usize, at as usize + 1);
+        }
+        (self.apply(at, size), self.apply(at + 1, size))
+    }
+
+    /// A texel number that may lie outside to one inside `0..size`.
     fn apply(self, at: i32, size: i32) -> usize {
         let inside = match self {
             Self::Clamp => at.clamp(0, size - 1),
             Self::Repeat if (0..size).contains(&at) => at,
+            // Nearly all sizes are powers of two, and division is slow.
+            Self::Repeat if size & (size - 1) == 0 => at & (size - 1),
             Self::Repeat => at.rem_euclid(size),
             Self::Mirror => {
                 let at = at.rem_euclid(2 * size);
@@ -132,19 +142,20 @@ impl Texture {
         let level = &self.levels[level.min(self.levels.len() - 1)];
         let (x, fx) = cell(uv.x, level.width);
         let (y, fy) = cell(uv.y, level.height);
-        let (x0, x1) = (wrap[0].apply(x, level.width), wrap[0].apply(x + 1, level.width));
-        let (y0, y1) = (wrap[1].apply(y, level.height), wrap[1].apply(y + 1, level.height));
+        let (x0, x1) = wrap[0].pair(x, level.width);
+        let (y0, y1) = wrap[1].pair(y, level.height);
         let (row0, row1) = (y0 * level.width as usize, y1 * level.width as usize);
-        let at = |i: usize| self.decode(srgb, level.texels[i]);
-        let (a, b, c, d) = (at(row0 + x0), at(row0 + x1), at(row1 + x0), at(row1 + x1));
-        let top = a + (b - a) * fx;
-        let bottom = c + (d - c) * fx;
-        top + (bottom - top) * fy
-    }
-
-    #[inline]
-    fn decode(&self, srgb: Srgb, texel: [u8; 4]) -> Vec4 {
-        decode(srgb, self.encoding, texel)
+        let texels = [row0 + x0, row0 + x1, row1 + x0, row1 + x1].map(|i| level.texels[i]);
+        let mix = |[a, b, c, d]: [Vec4; 4]| {
+            let top = a + (b - a) * fx;
+            let bottom = c + (d - c) * fx;
+            top + (bottom - top) * fy
+        };
+        // One question for four texels.
+        match self.encoding {
+            Encoding::Color => mix(texels.map(|texel| decode(srgb, Encoding::Color, texel))),
+            Encoding::Data => mix(texels.map(|texel| decode(srgb, Encoding::Data, texel))),
+        }
     }
 }
 
@@ -264,6 +275,9 @@ mod tests {
             assert_eq!(point(&texture, u, 0.25, Wrap::Repeat), repeat, "{u}");
             assert_eq!(point(&texture, u, 0.25, Wrap::Mirror), mirror, "{u}");
             assert_eq!(point(&texture, u, 0.25, Wrap::Clamp), clamp, "{u}");
+        }
+        for (at, size, expected) in [(-1, 4, 3), (9, 4, 1), (-4, 3, 2), (7, 3, 1)] {
+            assert_eq!(Wrap::Repeat.apply(at, size), expected);
         }
         for odd in [f32::NAN, f32::INFINITY, -1e30, 1e30] {
             assert!(point(&texture, odd, odd, Wrap::Repeat)[3] == 1.0);
