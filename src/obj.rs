@@ -22,6 +22,16 @@ use std::sync::Arc;
 /// What cannot stand in a relative address as it is.
 const RESERVED: &AsciiSet = &CONTROLS.add(b' ').add(b'%').add(b'?').add(b'#').add(b'"').add(b'<').add(b'>').add(b':');
 
+/// Is it an OBJ file, by its extension?
+pub fn is_obj(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"))
+}
+
+/// Reads a scene of any kind: OBJ by its extension, else glTF.
+pub fn read_any(path: &Path) -> Result<Scene, ReadError> {
+    if is_obj(path) { read(path) } else { read::read(path) }
+}
+
 /// Reads an OBJ file and the MTL files it names.
 pub fn read(path: &Path) -> Result<Scene, ReadError> {
     let bytes = std::fs::read(path).map_err(|e| ReadError::io(path, &e))?;

@@ -59,9 +59,9 @@ pub struct Recipe {
 pub struct MeshLook {
     /// Number of the scene in its wave, whose materials are meant.
     pub scene: usize,
-    /// Content of all materials and images of the mesh, primitive by primitive.
+    /// Content of the materials and images of the mesh's parts, primitive by primitive.
     pub hash: ContentHash,
-    /// Material of each primitive of the mesh, as an index in `materials`.
+    /// Material of each primitive of the parts, in their order, as an index in the document's `materials`.
     pub materials: Arc<Vec<Option<usize>>>,
     /// Pixels on each side of the pictures.
     pub size: u32,
@@ -83,8 +83,6 @@ pub struct PartTask {
     pub hash: MeshHash,
     /// The sub-mesh.
     pub mesh: Arc<Mesh>,
-    /// The mesh's primitives that it is made of.
-    pub primitives: Vec<usize>,
     /// Its sequences, one for each recipe; none if it is left as it is.
     pub sequences: Vec<JobKey>,
     /// Levels may refer to the source's vertices.
@@ -141,15 +139,14 @@ impl Plan {
                 let enough = settings.min_triangles <= mesh.triangles();
                 let sequence = |recipe| self.sequence(sub.hash, &mesh, recipe);
                 let sequences = if enough { recipes.iter().map(sequence).collect() } else { Vec::new() };
-                PartTask { hash: sub.hash, mesh, primitives: sub.primitives.clone(), sequences, shareable }
+                PartTask { hash: sub.hash, mesh, sequences, shareable }
             })
             .collect();
         if parts.iter().all(|part| part.sequences.is_empty()) {
             return MeshPlan::Alone("every part of it has fewer triangles than `min_triangles`");
         }
         let judged = look.filter(|_| settings.looks_decide()).cloned();
-        let tries = settings.simplify.effort == config::Effort::Best && settings.simplify.metric != config::Metric::Qem;
-        let rounds = if tries && judged.is_some() { ROUNDS } else { 0 };
+        let rounds = if settings.simplify.has_rounds() && judged.is_some() { ROUNDS } else { 0 };
         let chain = &settings.chain;
         let key = key_of(&ChainManifest { parts: &parts, chain, rounds, judged: judged.as_ref() });
         let chain = || ChainTask {
@@ -236,14 +233,16 @@ const FACTORS: [(f64, f64); 7] =
 /// Rounds of effort `best`: after four, pictures hardly get better.
 const ROUNDS: usize = 4;
 
-/// The recipes to try: one, but for metric `auto` and effort `best`. Each is a set of settings that users could write themselves, so that
-/// it shares its results with them.
+/// The recipes to try: one, but for metric `auto` and effort `best`. Each is a set of settings that users could write
+/// themselves, so that it shares its results with them.
 fn recipes(settings: &SimplifySettings) -> Vec<SimplifySettings> {
-    let best = settings.effort == config::Effort::Best;
-    // Rounds come later, on top of what `balanced` makes.
-    let effort = if best { config::Effort::Balanced } else { settings.effort };
-    let settings = SimplifySettings { effort, ..settings.clone() };
-    if settings.metric == config::Metric::Qem || (settings.metric == config::Metric::Its && !best) {
+    let has_choice = settings.has_choice();
+    let mut settings = settings.clone();
+    if settings.effort == config::Effort::Best {
+        // Rounds come later, on top of what `balanced` makes.
+        settings.effort = config::Effort::Balanced;
+    }
+    if !has_choice {
         return vec![settings];
     }
     let candidates = settings.candidates as usize;

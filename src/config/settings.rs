@@ -144,12 +144,22 @@ impl LevelTarget {
     }
 }
 
+impl SimplifySettings {
+    /// Whether rounds of re-weighting by pictures follow: metric `qem` has nothing to weight.
+    pub fn has_rounds(&self) -> bool {
+        self.effort == Effort::Best && self.metric != Metric::Qem
+    }
+
+    /// Whether several recipes are tried.
+    pub fn has_choice(&self) -> bool {
+        self.metric == Metric::Auto || self.has_rounds()
+    }
+}
+
 impl SceneSettings {
     /// Whether looks decide any byte of the outputs.
     pub fn looks_decide(&self) -> bool {
-        let SimplifySettings { metric, effort, .. } = self.simplify;
-        let tries = metric == Metric::Auto || (effort == Effort::Best && metric != Metric::Qem);
-        tries || self.chain.levels.iter().any(LevelTarget::is_looked_at)
+        self.simplify.has_choice() || self.chain.levels.iter().any(LevelTarget::is_looked_at)
     }
 }
 

@@ -7,7 +7,8 @@ pub mod borders;
 pub mod instances;
 pub mod inventory;
 
-use crate::gltf::document::DocumentError;
+use crate::gltf::document::{Document, DocumentError};
+use crate::gltf::json;
 use crate::gltf::scene::{Scene, SourceMesh, SourcePrimitive};
 use crate::mesh::hash::{MeshHash, hash};
 use crate::mesh::{Mesh, Primitive};
@@ -46,6 +47,15 @@ pub fn sub_meshes(source: &SourceMesh) -> Vec<SubMesh> {
         SubMesh { primitives: group.into_iter().map(|i| places[i]).collect(), hash }
     });
     named.collect()
+}
+
+/// Materials of a mesh's sub-meshes, primitive by primitive in their order: what the parts look like, wherever in the
+/// mesh they stand and whatever else it has.
+pub fn materials(document: &Document, mesh: usize, sub_meshes: &[SubMesh]) -> Vec<Option<usize>> {
+    let entry = document.array("meshes").ok().and_then(|meshes| meshes.get(mesh));
+    let primitives = entry.and_then(|entry| entry.get("primitives"));
+    let material = |&p: &usize| primitives?.get(p)?.get("material").and_then(json::integer).map(|i| i as usize);
+    sub_meshes.iter().flat_map(|sub| &sub.primitives).map(material).collect()
 }
 
 /// One sub-mesh of one scene, in figures: what an index keeps so that an unchanged scene need not be read again.

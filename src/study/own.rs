@@ -4,18 +4,16 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use serde_json::Value;
-
-use crate::appearance::looks::Looks;
+use crate::appearance::assemble;
 use crate::config::{ChainSettings, LevelTarget, SceneSettings, Storage};
 use crate::gltf::document::Container;
 use crate::gltf::error::{DocumentError, ReadError};
+use crate::gltf::instancing;
 use crate::gltf::lod::{MeshLevel, MeshLevels, PrimitiveLevel, add_levels};
 use crate::gltf::package::Package;
 use crate::gltf::scene::{Scene, SourceMesh};
 use crate::gltf::write::WriteError;
-use crate::gltf::{instancing, json, read};
-use crate::identify::{SubMesh, sub_meshes};
+use crate::identify::{SubMesh, materials, sub_meshes};
 use crate::key::ContentHash;
 use crate::mesh::layout::frame;
 use crate::obj;
@@ -39,12 +37,6 @@ pub enum OwnError {
     None(String),
 }
 
-/// Reads a scene of any kind that lodbake reads.
-fn read_scene(file: &Path) -> Result<Scene, ReadError> {
-    let is_obj = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
-    if is_obj { obj::read(file) } else { read::read(file) }
-}
-
 /// The scene with one level of `ratio` for every mesh (between 0 and 1, exclusive), as a GLB.
 pub fn bake(file: &Path, settings: &SceneSettings, ratio: f64) -> Result<Vec<u8>, OwnError> {
     if 1.0 <= ratio {
@@ -53,7 +45,7 @@ pub fn bake(file: &Path, settings: &SceneSettings, ratio: f64) -> Result<Vec<u8>
     let mut settings = settings.clone();
     let levels = vec![LevelTarget::Ratio(ratio)];
     settings.chain = ChainSettings { levels, storage: Storage::Compact, ..settings.chain };
-    let scene = read_scene(file)?;
+    let scene = obj::read_any(file)?;
     let levels = levels_of(file, &scene, &settings)?;
     let Scene { document, buffers, dependencies, .. } = scene;
     let batches = instancing::batches(&document, &buffers)?;
@@ -68,13 +60,13 @@ fn levels_of(file: &Path, scene: &Scene, settings: &SceneSettings) -> Result<Vec
     let meshes = scene.meshes.iter().zip(&subs);
     let plans: Vec<MeshPlan> = meshes
         .map(|(mesh, subs)| {
-            let look = settings.looks_decide().then(|| look_of(scene, mesh, settings));
+            let look = settings.looks_decide().then(|| look_of(scene, mesh, subs, settings));
             // Levels with vertices of their own can be added to any source.
             plan.add(mesh, subs, true, look.as_ref(), settings)
         })
         .collect();
     let base = file.parent().unwrap_or(Path::new(""));
-    let load = |_| Arc::new(Looks::load(&scene.document, &scene.buffers, base, None));
+    let load = |_| assemble::looks(scene, base);
     let chains = chains(&plan, &load);
     let mut out = Vec::new();
     let mut reason = "no pair of vertices can be contracted";
@@ -108,12 +100,8 @@ fn levels_of(file: &Path, scene: &Scene, settings: &SceneSettings) -> Result<Vec
 }
 
 /// What a mesh looks like, for metrics that look. Nothing is kept, so the numbers of materials stand for what they show.
-fn look_of(scene: &Scene, mesh: &SourceMesh, settings: &SceneSettings) -> MeshLook {
-    let entry = scene.document.array("meshes").ok().and_then(|meshes| meshes.get(mesh.index));
-    let primitives = entry.and_then(|entry| entry.get("primitives")?.as_array());
-    let material = |p: &Value| p.get("material").and_then(json::integer).map(|i| i as usize);
-    let materials: Vec<Option<usize>> =
-        primitives.map_or_else(Vec::new, |primitives| primitives.iter().map(material).collect());
+fn look_of(scene: &Scene, mesh: &SourceMesh, subs: &[SubMesh], settings: &SceneSettings) -> MeshLook {
+    let materials = materials(&scene.document, mesh.index, subs);
     let hash = ContentHash(*blake3::hash(format!("{materials:?}").as_bytes()).as_bytes());
     MeshLook { scene: 0, hash, materials: Arc::new(materials), size: settings.appearance.size }
 }

@@ -36,7 +36,7 @@ const SAMPLES: usize = 8192;
 /// The source of one mesh, drawn once.
 pub(super) struct Judge<'a> {
     tasks: &'a [PartTask],
-    look: &'a MeshLook,
+    size: u32,
     looks: Arc<Looks>,
     /// One list for each task, one part for each primitive.
     source: Vec<Vec<Arc<Part>>>,
@@ -45,18 +45,19 @@ pub(super) struct Judge<'a> {
 }
 
 impl<'a> Judge<'a> {
-    pub(super) fn new(tasks: &'a [PartTask], look: &'a MeshLook, looks: &Arc<Looks>) -> Self {
-        let part = |task: &PartTask, index: usize| {
-            let material = looks.material(look.materials[task.primitives[index]]);
-            Arc::new(Part::new(&task.mesh.primitives[index], material))
+    pub(super) fn new(tasks: &'a [PartTask], look: &MeshLook, looks: &Arc<Looks>) -> Self {
+        let mut materials = look.materials.iter().map(|&material| looks.material(material));
+        let mut part = |primitive| {
+            let material = materials.next().expect("a look has a material for each primitive of the parts");
+            Arc::new(Part::new(primitive, material))
         };
         let source: Vec<Vec<Arc<Part>>> =
-            tasks.iter().map(|task| (0..task.primitives.len()).map(|index| part(task, index)).collect()).collect();
+            tasks.iter().map(|task| task.mesh.primitives.iter().map(&mut part).collect()).collect();
         let drawable = Drawable::of_parts(source.iter().flatten().cloned().collect(), looks.clone());
         let shot = Shot { size: look.size, faces: false };
         let reference = Reference::new(&Cpu, &drawable, drawable.frame(), &rhombicuboctahedron(), shot)
             .expect("the configuration allows only sizes that can be drawn");
-        Self { tasks, look, looks: looks.clone(), source, corners: soup(&drawable).corners, reference }
+        Self { tasks, size: look.size, looks: looks.clone(), source, corners: soup(&drawable).corners, reference }
     }
 
     /// The source itself. Faces are numbered part by part and primitive by primitive, as in the meshes.
@@ -66,7 +67,7 @@ impl<'a> Judge<'a> {
 
     /// Pixels on each side of the pictures.
     pub(super) fn size(&self) -> u32 {
-        self.look.size
+        self.size
     }
 
     /// d_RMS of a level: one entry for each task, `None` = as the source.
@@ -97,9 +98,8 @@ impl<'a> Judge<'a> {
                 parts.extend(source.iter().cloned());
                 continue;
             };
-            for (index, primitive) in level.primitives.iter().enumerate() {
-                let material = self.looks.material(self.look.materials[task.primitives[index]]);
-                parts.push(Arc::new(Part::of_level(&task.mesh.primitives[index], primitive, material)));
+            for ((primitive, own), drawn) in level.primitives.iter().zip(&task.mesh.primitives).zip(source) {
+                parts.push(Arc::new(Part::of_level(own, primitive, drawn.material)));
             }
         }
         Drawable::of_parts(parts, self.looks.clone())

@@ -39,8 +39,6 @@ pub struct Baked {
     pub chains: BTreeMap<JobKey, Arc<Chain>>,
     /// How the levels of a chain look, in their order.
     pub looks: BTreeMap<JobKey, Arc<Vec<LevelLook>>>,
-    /// Chains whose levels were drawn to be recorded.
-    pub drawn: usize,
     /// Sub-meshes that were simplified.
     pub jobs: usize,
     /// Sub-meshes whose results came from the cache.
@@ -214,7 +212,6 @@ fn record_looks(plan: &Plan, cache: &Cache, load: LoadLooks, out: &mut Baked) {
             None => missing.push((key, task)),
         }
     }
-    out.drawn = missing.len();
     for group in by_scene(missing, |(_, task)| task.look.scene) {
         let looks = load(group[0].1.look.scene);
         let chains = &out.chains;

@@ -344,6 +344,22 @@ fn equal_meshes_with_other_materials_are_one_job() {
 }
 
 #[test]
+fn equal_parts_of_unlike_meshes_look_alike() {
+    let mut scene = Scene::new();
+    for name in ["with points", "alone"] {
+        let mesh = scene.mesh(name, &Shape::sphere(12, 16));
+        scene.node(name, mesh, [0.0; 3]);
+    }
+    scene.add_points(0);
+    let space = space(&[("pair.glb", scene.glb())]);
+    space.run_fine(&[]);
+    let report = space.json("out/report.json");
+    let looks = |mesh: usize| &report["scenes"][0]["meshes"][mesh]["levels"][0]["d_rms"];
+    assert!(looks(0).as_f64().is_some_and(|d_rms| 0.0 < d_rms), "{report:#}");
+    assert_eq!(looks(0), looks(1));
+}
+
+#[test]
 fn a_scene_without_triangles_to_spare_is_copied() {
     let space = space(&[("tiny.glb", Scene::of(&Shape::grid(2, 0.0)).glb())]);
     let run = space.run_fine(&["--json"]);

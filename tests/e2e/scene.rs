@@ -127,6 +127,13 @@ impl Scene {
         )
     }
 
+    /// Puts points at the corners of a mesh before its triangles, with the other material.
+    pub fn add_points(&mut self, mesh: usize) {
+        let primitives = self.json["meshes"][mesh]["primitives"].as_array_mut().expect("it is an array");
+        let position = primitives[0]["attributes"]["POSITION"].clone();
+        primitives.insert(0, json!({ "mode": 0, "attributes": { "POSITION": position }, "material": 1 }));
+    }
+
     /// Appends a node of the scene; answers its index.
     pub fn node(&mut self, name: &str, mesh: usize, translation: [f32; 3]) -> usize {
         let node = self.push("nodes", json!({ "name": name, "mesh": mesh, "translation": translation }));

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use serde_json::Value;
 
 use super::Session;
 use super::record::{self, SceneFacts};
 use super::survey::Todo;
+use crate::appearance::assemble;
 use crate::appearance::fingerprint::Fingerprints;
 use crate::appearance::looks::Looks;
 use crate::cache::{Bucket, Cache, Lookup};
@@ -17,19 +17,19 @@ use crate::config::Format;
 use crate::emit::{Content, Emission, Emitted, EmittedFile, OutputFolder};
 use crate::gltf::dependencies::{Dependency, DependencyKind, dependencies};
 use crate::gltf::document::{Container, Document};
+use crate::gltf::instancing;
 use crate::gltf::lod::{MeshLevel, MeshLevels, PrimitiveLevel, WriteError, add_levels, is_sealed, switches};
 use crate::gltf::package::Package;
 use crate::gltf::scene::{Scene, SourceMesh};
-use crate::gltf::{instancing, json, read};
 use crate::identify::instances::mesh_uses;
-use crate::identify::{SubMesh, sub_meshes};
+use crate::identify::{SubMesh, materials, sub_meshes};
 use crate::index::{self, Seen};
 use crate::key::JobKey;
 use crate::lod::Chain;
 use crate::mesh::hash::MeshHash;
 use crate::mesh::layout::frame;
 use crate::mesh::{Level, LevelPrimitive, LevelVertices};
-use crate::obj;
+use crate::obj::{self, is_obj};
 use crate::plan::{MeshLook, MeshPlan, Plan};
 use crate::progress::Event;
 use crate::report::{OutputRecord, Problem, SceneRecord, Severity, Status};
@@ -151,7 +151,7 @@ impl Session<'_> {
     /// Bakes a wave.
     pub fn bake_wave(&mut self, wave: Vec<Todo>, output: &OutputFolder) {
         let (scenes, plan) = self.read_wave(wave);
-        let load = |number: usize| Arc::new(scenes[number].load_looks());
+        let load = |number: usize| scenes[number].load_looks();
         let baked = work(&plan, &self.cache, &load, &*self.context.reporter);
         self.summary.jobs += baked.jobs as u64;
         self.summary.cache_hits += baked.hits as u64;
@@ -222,14 +222,18 @@ impl ReadScene {
 
 impl ReadScene {
     /// Materials and textures. What is missing is told by the warnings of the scene's record.
-    fn load_looks(&self) -> Looks {
-        let base = self.todo.file.path.parent().unwrap_or(Path::new(""));
-        Looks::load(&self.scene.document, &self.scene.buffers, base, None)
+    fn load_looks(&self) -> Arc<Looks> {
+        assemble::looks(&self.scene, self.todo.file.path.parent().unwrap_or(Path::new("")))
     }
 }
 
 /// What each mesh looks like, where the settings ask for it.
-fn mesh_looks(scene: &Scene, beside: &[(PathBuf, index::Dependency)], todo: &Todo) -> Vec<Option<MeshLook>> {
+fn mesh_looks(
+    scene: &Scene,
+    sub_meshes: &[Vec<SubMesh>],
+    beside: &[(PathBuf, index::Dependency)],
+    todo: &Todo,
+) -> Vec<Option<MeshLook>> {
     let settings = &todo.settings;
     if !settings.appearance.record && !settings.looks_decide() {
         return vec![None; scene.meshes.len()];
@@ -239,14 +243,8 @@ fn mesh_looks(scene: &Scene, beside: &[(PathBuf, index::Dependency)], todo: &Tod
         Some(beside.iter().find(|(found, _)| found == path)?.1.seen.as_ref()?.content)
     };
     let fingerprints = Fingerprints::new(&scene.document, &scene.buffers, &external);
-    let materials = |mesh: usize| {
-        let entry = scene.document.array("meshes").ok().and_then(|meshes| meshes.get(mesh));
-        let primitives = entry.and_then(|entry| entry.get("primitives")?.as_array());
-        let material = |p: &Value| p.get("material").and_then(json::integer).map(|i| i as usize);
-        primitives.map_or_else(Vec::new, |primitives| primitives.iter().map(material).collect())
-    };
     let look = |source: &SourceMesh| {
-        let materials: Vec<Option<usize>> = materials(source.index);
+        let materials = materials(&scene.document, source.index, &sub_meshes[source.index]);
         let hash = fingerprints.of(&materials);
         Some(MeshLook { scene: 0, hash, materials: Arc::new(materials), size: settings.appearance.size })
     };
@@ -261,16 +259,15 @@ fn read_scene(todo: Todo) -> Result<ReadScene, Failure> {
         hint: hint.map(str::to_owned),
     };
     let base = file.path.parent().unwrap_or(Path::new(""));
-    let is_obj = is_obj(&file.path);
+    let converted = is_obj(&file.path);
     // Files are looked at before they are read: one that changes in between is found by the next bake.
     let bytes = std::fs::read(&file.path)
         .map_err(|error| failure(format!("failed to read `{}`: {error}", file.path.display()), None))?;
     let seen = Seen::of(file.stat, &bytes);
     let named = Document::parse(&bytes).map(|document| dependencies(&document, base)).unwrap_or_default();
     let mut beside = see(base, &named);
-    let scene = if is_obj { obj::read(&file.path) } else { read::read(&file.path) };
-    let scene = scene.map_err(|error| failure(error.to_string(), error.hint()))?;
-    if is_obj {
+    let scene = obj::read_any(&file.path).map_err(|error| failure(error.to_string(), error.hint()))?;
+    if converted {
         beside = see(base, &scene.dependencies);
     }
     let sub_meshes: Vec<Vec<SubMesh>> = scene.meshes.par_iter().map(sub_meshes).collect();
@@ -282,7 +279,7 @@ fn read_scene(todo: Todo) -> Result<ReadScene, Failure> {
         .map(|seen| seen.stat.size)
         .sum();
     Ok(ReadScene {
-        looks: mesh_looks(&scene, &beside, &todo),
+        looks: mesh_looks(&scene, &sub_meshes, &beside, &todo),
         instances: uses.iter().map(|used| used.instances).collect(),
         radii: scene.meshes.iter().map(radius).collect(),
         plans: Vec::new(),
@@ -325,10 +322,6 @@ struct Written {
     facts: SceneFacts,
     bake: index::Bake,
     new_files: u64,
-}
-
-fn is_obj(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"))
 }
 
 /// Where a scene goes: below `root`, at its own place, with the extension of its container.
