@@ -1,42 +1,19 @@
 //! Every scene of the corpus can be drawn, at every level it has, and looks exactly like itself.
 
+mod corpus;
+
+use corpus::{corpus, files};
 use lodbake::appearance::assemble;
 use lodbake::appearance::metric::Reference;
 use lodbake::appearance::render::{Cpu, Shot};
 use lodbake::appearance::views::fibonacci;
-use lodbake::{gltf, obj};
+use lodbake::obj;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
-/// The corpus, or nothing where there is none; CI must have one.
-#[expect(clippy::print_stdout, reason = "a skipped test says so aloud")]
-fn corpus() -> Option<PathBuf> {
-    let folder = std::env::var_os("LODBAKE_CORPUS")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/corpus"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    assert!(std::env::var_os("CI").is_none(), "CI needs the corpus: set LODBAKE_CORPUS");
-    println!("SKIPPED: there is no corpus at `{}`; set LODBAKE_CORPUS", folder.display());
-    None
-}
-
-fn files(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(folder).expect("a readable folder") {
-        let path = entry.expect("a readable entry").path();
-        if path.is_dir() {
-            files(&path, found);
-        } else if path.extension().is_some_and(|e| e == "glb" || e == "gltf" || e == "obj") {
-            found.push(path);
-        }
-    }
-    found.sort();
-}
-
 /// Pixels that something is seen in; `None` if the file cannot be read or has nothing to draw.
 fn draw(file: &Path) -> Option<usize> {
-    let is_obj = file.extension().is_some_and(|e| e == "obj");
-    let scene = if is_obj { obj::read(file) } else { gltf::read::read(file) }.ok()?;
+    let scene = obj::read_any(file).ok()?;
     let looks = assemble::looks(&scene, file.parent().expect("a file is in a folder"));
     let drawable = assemble::scene(&scene, looks.clone(), 0).ok()?;
     if drawable.triangles() == 0 {
@@ -58,8 +35,7 @@ fn draw(file: &Path) -> Option<usize> {
 #[test]
 fn every_scene_is_drawn_and_equals_itself() {
     let Some(corpus) = corpus() else { return };
-    let mut all = Vec::new();
-    files(&corpus, &mut all);
+    let all = files(&corpus, &["glb", "gltf", "obj"]);
     let drawn: Vec<(PathBuf, usize)> =
         all.into_par_iter().filter_map(|file| Some((file.clone(), draw(&file)?))).collect();
     assert!(drawn.len() > 90, "only {} scenes were drawn", drawn.len());

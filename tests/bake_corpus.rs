@@ -1,24 +1,15 @@
 //! Bakes the whole corpus with the program itself and checks every output against its source: all rules hold, nothing
 //! is lost, every level can be read again.
 
-#![allow(clippy::print_stdout)] // a test that skips must say so
+#![allow(clippy::print_stdout)] // how much was checked is said aloud
 
+mod corpus;
+
+use corpus::{corpus, scenes};
 use lodbake::gltf::read::read;
 use lodbake::gltf::scene::Scene;
 use lodbake::gltf::{json, rules};
-use std::path::{Path, PathBuf};
-
-/// The folder of real scenes, if this machine has it. CI must have it.
-fn corpus() -> Option<PathBuf> {
-    let folder = std::env::var_os("LODBAKE_CORPUS")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/corpus"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    assert!(std::env::var_os("CI").is_none(), "CI needs the corpus: set LODBAKE_CORPUS");
-    println!("SKIPPED: there is no corpus at `{}`; set LODBAKE_CORPUS", folder.display());
-    None
-}
+use std::path::Path;
 
 /// Levels in both kinds of storage, in both containers.
 fn pipeline(corpus: &Path) -> String {
@@ -34,26 +25,8 @@ fn pipeline(corpus: &Path) -> String {
          [[override]]\n\
          match = ['**/KHR_t*/**', '**/uv1*/**', '**/skin*/**']\n\
          format = 'glb'\n",
-        input = corpus.canonicalize().unwrap().to_str().unwrap()
+        input = corpus.to_str().unwrap()
     )
-}
-
-/// All scenes below a folder, in a stable order.
-fn scenes(folder: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    let mut open = vec![folder.to_owned()];
-    while let Some(folder) = open.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                open.push(path);
-            } else if path.extension().is_some_and(|e| e == "gltf" || e == "glb") {
-                found.push(path);
-            }
-        }
-    }
-    found.sort();
-    found
 }
 
 /// The source of an output, which may have been in the other container.

@@ -1,8 +1,11 @@
 //! Gives crude levels to every readable scene of the corpus, writes it in every format, reads it again: every rule
 //! holds, nothing is lost, and every level has the geometry that went in. The files stay in the folder `LODBAKE_KEEP`
 //! if that is set, for other tools to look at.
-#![expect(clippy::print_stdout, reason = "what was skipped and how much was checked is said aloud")]
+#![expect(clippy::print_stdout, reason = "how much was checked is said aloud")]
 
+mod corpus;
+
+use corpus::{corpus, scenes};
 use lodbake::config::{EmitSettings, Profile};
 use lodbake::emit::{Content, Emission, Emitted, OutputFolder};
 use lodbake::gltf::document::{Container, Document};
@@ -18,36 +21,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 const DRACO: &str = "KHR_draco_mesh_compression";
-
-/// The folder of real scenes, if this machine has it. CI must have it.
-fn corpus() -> Option<PathBuf> {
-    let folder = std::env::var_os("LODBAKE_CORPUS")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/corpus"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    assert!(std::env::var_os("CI").is_none(), "CI needs the corpus: set LODBAKE_CORPUS");
-    println!("SKIPPED: there is no corpus at `{}`; set LODBAKE_CORPUS", folder.display());
-    None
-}
-
-/// All scenes below a folder, in a stable order.
-fn scenes(folder: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    let mut open = vec![folder.to_owned()];
-    while let Some(folder) = open.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                open.push(path);
-            } else if path.extension().is_some_and(|e| e == "gltf" || e == "glb") {
-                found.push(path);
-            }
-        }
-    }
-    found.sort();
-    found
-}
 
 /// Keeps the first half of the triangles at level 1, the first quarter at level 2.
 fn levels(scene: &Scene, shared: bool) -> Vec<MeshLevels> {

@@ -1,28 +1,17 @@
 //! Levels by appearance on real assets: each is the coarsest cut that keeps to its target, so one contraction further
 //! is over it.
 
-#![allow(clippy::print_stdout)] // a test that skips must say so
+mod corpus;
 
+use corpus::corpus;
 use lodbake::report::{Report, read};
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Small enough for a test; the search is the same for all.
 const ASSETS: [&str; 4] = ["duck", "suzanne", "avocado", "water-bottle"];
 /// d_RMS, with pictures of 96 pixels a side.
 const TARGETS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
-
-/// The folder of real scenes, if this machine has it. CI must have it.
-fn corpus() -> Option<PathBuf> {
-    let folder = std::env::var_os("LODBAKE_CORPUS")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/corpus"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder.canonicalize().unwrap());
-    }
-    assert!(std::env::var_os("CI").is_none(), "CI needs the corpus: set LODBAKE_CORPUS");
-    println!("SKIPPED: there is no corpus at `{}`; set LODBAKE_CORPUS", folder.display());
-    None
-}
 
 /// Bakes one asset with the levels that `lod` lists; sequences come from the cache of the runs before.
 fn bake(folder: &Path, corpus: &Path, asset: &str, lod: &str) -> Report {

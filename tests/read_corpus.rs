@@ -1,6 +1,9 @@
 //! Reads every scene of the corpus: valid ones must be read, broken ones refused with a reason, and nothing may
 //! panic, hang or ask for absurd amounts of memory.
 
+mod corpus;
+
+use corpus::{corpus, scenes};
 use lodbake::gltf::document::{Container, Document};
 use lodbake::gltf::error::ReadCause;
 use lodbake::gltf::read;
@@ -12,37 +15,6 @@ use lodbake::obj;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-
-/// The folder of real scenes, if this machine has it. CI must have it.
-#[expect(clippy::print_stdout, reason = "a skipped test says so aloud")]
-fn corpus() -> Option<PathBuf> {
-    let folder = std::env::var_os("LODBAKE_CORPUS")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/corpus"), PathBuf::from);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    assert!(std::env::var_os("CI").is_none(), "CI needs the corpus: set LODBAKE_CORPUS");
-    println!("SKIPPED: there is no corpus at `{}`; set LODBAKE_CORPUS", folder.display());
-    None
-}
-
-/// All scenes below a folder, in a stable order.
-fn scenes(folder: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    let mut open = vec![folder.to_owned()];
-    while let Some(folder) = open.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                open.push(path);
-            } else if path.extension().is_some_and(|e| e == "gltf" || e == "glb") {
-                found.push(path);
-            }
-        }
-    }
-    found.sort();
-    found
-}
 
 /// `(scenes, meshes, triangle primitives, passed-through primitives, triangles)` of a folder, and what was refused.
 fn read_folder(folder: &Path) -> ([usize; 5], String) {

@@ -1,7 +1,10 @@
 //! Simplifies every mesh of the corpus, all primitives of a mesh together, and checks what every level must be.
 
-use std::path::{Path, PathBuf};
+mod corpus;
 
+use std::path::Path;
+
+use corpus::{corpus, scenes};
 use lodbake::gltf::read;
 use lodbake::gltf::scene::SourceMesh;
 use lodbake::lod::{ChainSettings, Part, Storage, Target, chain};
@@ -12,31 +15,6 @@ use lodbake::metric::its::EdgeWeights;
 use lodbake::simplify::{MetricKind, Settings, simplify};
 use rayon::prelude::*;
 
-#[expect(clippy::print_stderr, reason = "a test that is skipped says so")]
-/// The corpus folder; `None` (said aloud) if it is not there, a failure in CI.
-fn corpus() -> Option<PathBuf> {
-    let named = std::env::var_os("LODBAKE_CORPUS").map(PathBuf::from);
-    let folder = named.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/corpus"));
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    assert!(std::env::var_os("CI").is_none(), "LODBAKE_CORPUS does not name the corpus");
-    eprintln!("skipped: no corpus (set LODBAKE_CORPUS)");
-    None
-}
-
-fn scene_files(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(folder).expect("a readable folder") {
-        let path = entry.expect("a readable entry").path();
-        if path.is_dir() {
-            scene_files(&path, found);
-        } else if path.extension().is_some_and(|e| e == "glb" || e == "gltf") {
-            found.push(path);
-        }
-    }
-    found.sort();
-}
-
 fn settings(metric: MetricKind, placement: Placement) -> Settings {
     let attributes = AttributeScale { normal: 0.003, texcoord: 0.3, color: 0.1 };
     let edges = EdgeWeights { border: 1.0, seam: 0.3, crease: 0.01 };
@@ -46,10 +24,8 @@ fn settings(metric: MetricKind, placement: Placement) -> Settings {
 #[test]
 fn every_level_of_every_mesh_is_sound() {
     let Some(corpus) = corpus() else { return };
-    let mut files = Vec::new();
-    for folder in ["features", "quality", "scenes"] {
-        scene_files(&corpus.join(folder), &mut files);
-    }
+    let folders = ["features", "quality", "scenes"];
+    let files: Vec<_> = folders.iter().flat_map(|folder| scenes(&corpus.join(folder))).collect();
     let meshes: usize =
         files.par_iter().map(|file| read::read(file).map_or(0, |scene| check_all(file, &scene.meshes))).sum();
     assert!(meshes > 1000, "only {meshes} meshes were read");

@@ -1,6 +1,6 @@
 //! What is simplified: two meshes of the corpus, and a large one made of the second.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use lodbake::gltf::read;
 use lodbake::mesh::{Attribute, Format, Mesh, Primitive};
@@ -23,17 +23,6 @@ pub struct Flat {
     pub positions: Vec<[f32; 3]>,
     /// Normal and texture coordinate, zero where there is none.
     pub attributes: Vec<[f32; 5]>,
-}
-
-/// The corpus folder; `None` (said aloud) if it is not there.
-pub fn corpus() -> Option<PathBuf> {
-    let named = std::env::var_os("LODBAKE_CORPUS").map(PathBuf::from);
-    let folder = named.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/corpus"));
-    if !folder.is_dir() {
-        println!("skipped: no corpus (set LODBAKE_CORPUS)");
-        return None;
-    }
-    Some(folder)
 }
 
 /// Meshes whose name has one of `names` in it; all if there are none.

@@ -2,9 +2,9 @@
 //!
 //! One thread. All take turns in one run, so that what else the machine does hits all alike; the ratio of two medians
 //! would mix different minutes, which is why no harness that times one function after the other is used. Seconds are
-//! CPU time, the least and the median of the rounds, ratios those of the least. The work of lodbake is all of a bake but files: weld, topology,
-//! sequence, cuts, vertices of each level, measured errors (also shown apart). That of meshoptimizer is
-//! `meshopt_simplifyWithAttributes` from level to level and nothing else.
+//! CPU time, the least and the median of the rounds, ratios those of the least. The work of lodbake is all of a bake but
+//! files and looks: weld, topology, sequence, cuts, vertices of each level, measured errors (also shown apart). That of
+//! meshoptimizer is `meshopt_simplifyWithAttributes` from level to level and nothing else.
 //!
 //! `LODBAKE_CORPUS` names the corpus. `cargo bench -- [--rounds N] [--memory] [PART OF A NAME]..`; `--memory` adds the
 //! peak of the resident set, each in a process of its own.
@@ -13,6 +13,8 @@
 
 mod assets;
 mod clock;
+#[path = "../../tests/corpus/mod.rs"]
+mod corpus;
 mod memory;
 mod work;
 
@@ -44,7 +46,7 @@ fn main() -> ExitCode {
             name => arguments.names.push(name.to_owned()),
         }
     }
-    let Some(corpus) = assets::corpus() else { return ExitCode::SUCCESS };
+    let Some(corpus) = corpus::corpus() else { return ExitCode::SUCCESS };
     for asset in assets::load(&corpus, &arguments.names) {
         compare(&asset, &arguments);
     }

@@ -8,8 +8,8 @@ use super::{Context, Exit};
 use crate::gltf::dependencies::DependencyKind;
 use crate::gltf::scene::Scene;
 use crate::identify::survey;
+use crate::obj;
 use crate::report::inspection::Inspection;
-use crate::{gltf, obj};
 
 /// Show what is in a scene: structure, distinct meshes, instances, and what a bake would save.
 #[derive(Clone, Debug, clap::Args)]
@@ -49,8 +49,7 @@ impl Inspect {
 }
 
 fn inspect(file: &Path) -> anyhow::Result<Inspection> {
-    let is_obj = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
-    let scene = if is_obj { obj::read(file)? } else { gltf::read::read(file)? };
+    let scene = obj::read_any(file)?;
     let named = || format!("failed to inspect `{}`", file.display());
     let found = survey(&scene).with_context(named)?;
     Inspection::new(file.display().to_string(), size(file, &scene), &scene, &found).with_context(named)

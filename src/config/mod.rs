@@ -76,12 +76,19 @@ pub struct Pipeline {
     overrides: Vec<(Globs, resolve::Layer)>,
 }
 
+/// Text of a configuration file, and the file's path as the user wrote it.
+pub fn read_text(file: &Path) -> Result<(String, String), ConfigError> {
+    let written = file.display().to_string();
+    match std::fs::read_to_string(file) {
+        Ok(text) => Ok((text, written)),
+        Err(source) => Err(ConfigError::Read { file: written, source }),
+    }
+}
+
 impl Pipeline {
     /// Reads and validates a file.
     pub fn load(file: &Path) -> Result<Self, ConfigError> {
-        let written = file.display().to_string();
-        let text =
-            std::fs::read_to_string(file).map_err(|source| ConfigError::Read { file: written.clone(), source })?;
+        let (text, written) = read_text(file)?;
         Self::parse(&text, &written)
     }
 

@@ -9,7 +9,7 @@ use crate::compare::{Soup, TextureStretch};
 use crate::gltf::dependencies::DependencyKind;
 use crate::gltf::document::DocumentError;
 use crate::gltf::error::ReadError;
-use crate::{gltf, obj};
+use crate::obj;
 
 /// Something to be compared.
 #[derive(Debug)]
@@ -67,8 +67,7 @@ impl Subject {
     /// are fewer.
     pub fn load(written: &str) -> Result<Self, SubjectError> {
         let (path, level) = parse(written);
-        let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
-        let scene = if is_obj { obj::read(path)? } else { gltf::read::read(path)? };
+        let scene = obj::read_any(path)?;
         let looks = assemble::looks(&scene, path.parent().unwrap_or(Path::new("")));
         let drawable = assemble::scene(&scene, looks, level)
             .map_err(|cause| SubjectError::Nodes { path: path.to_owned(), cause })?;

@@ -8,7 +8,7 @@ use super::file::{self, AlgorithmEntry, StudyFile};
 use super::template::{Placeholder, Template};
 use crate::config::check::Document;
 use crate::config::file::OneOrMany;
-use crate::config::{ConfigError, Globs, Names, Place, SceneSettings};
+use crate::config::{ConfigError, Globs, Names, Place, SceneSettings, read_text};
 
 /// A validated `study.toml`.
 #[derive(Clone, Debug)]
@@ -97,9 +97,7 @@ pub enum Kind {
 impl Study {
     /// Reads and validates a file.
     pub fn load(file: &Path) -> Result<Self, ConfigError> {
-        let written = file.display().to_string();
-        let text =
-            std::fs::read_to_string(file).map_err(|source| ConfigError::Read { file: written.clone(), source })?;
+        let (text, written) = read_text(file)?;
         Self::parse(&text, &written)
     }
 
