@@ -179,7 +179,7 @@ pub(super) struct AppearanceTable {
     #[schemars(extend("default" = true))]
     pub record: Option<bool>,
 
-    /// Pixels on each side of the pictures. Default: 256.
+    /// Pixels on each side of the pictures. Default: 128.
     #[schemars(range(min = 32, max = 2048), extend("default" = defaults::LOOK_SIZE))]
     pub size: Option<u32>,
 }
