@@ -142,7 +142,7 @@ impl Reporter for Lines {
                 let mut tally = self.tally();
                 tally.files.total = tally.files.total.saturating_sub(1);
             }
-            Event::SceneStarted { .. } => {}
+            Event::SceneStarted { .. } | Event::LookFinished => {}
             Event::SceneRead { path, meshes, .. } => {
                 self.tell(Verbosity::Verbose, &format!("read {path}: {}", plural(*meshes, "mesh")));
             }
@@ -153,6 +153,9 @@ impl Reporter for Lines {
                 let how = if *cached { "from the cache" } else { "baked" };
                 self.tell(Verbosity::Verbose, &format!("{how} {mesh}"));
                 self.step("meshes", |tally| &mut tally.jobs);
+            }
+            Event::LooksStarted { meshes } => {
+                self.tell(Verbosity::Normal, &format!("looking at the levels of {}", plural(*meshes, "mesh")));
             }
             Event::ScanFailed { error } => self.tell(Verbosity::Quiet, &self.paint.error_lines(error, None)),
             Event::SceneVanished { path } => {

@@ -76,6 +76,13 @@ pub enum Event {
         /// It came from the cache.
         cached: bool,
     },
+    /// Pictures of levels are about to be drawn and compared, so that their looks can be recorded.
+    LooksStarted {
+        /// Meshes whose levels are not measured yet.
+        meshes: u64,
+    },
+    /// The looks of one mesh's levels are measured.
+    LookFinished,
     /// `--dry-run` only: what would be done with a scene.
     ScenePlanned {
         /// Scene file.

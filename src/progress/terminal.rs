@@ -1,4 +1,4 @@
-//! Events on a terminal: two bars that disappear when the work is done, and lines for what must be read.
+//! Events on a terminal: three bars that disappear when the work is done, and lines for what must be read.
 
 use std::fmt;
 use std::sync::{Mutex, PoisonError};
@@ -22,6 +22,7 @@ pub struct Terminal {
     bars: MultiProgress,
     files: ProgressBar,
     jobs: ProgressBar,
+    looks: ProgressBar,
     paint: Paint,
     verbose: bool,
     state: Mutex<State>,
@@ -56,7 +57,8 @@ impl Terminal {
         // Hidden until there is something to count: most commands send no event.
         let files = ProgressBar::hidden().with_style(files_style());
         let jobs = ProgressBar::hidden().with_style(jobs_style());
-        Self { bars, files, jobs, paint, verbose, state: Mutex::default() }
+        let looks = ProgressBar::hidden().with_style(files_style());
+        Self { bars, files, jobs, looks, paint, verbose, state: Mutex::default() }
     }
 
     fn state(&self) -> std::sync::MutexGuard<'_, State> {
@@ -148,6 +150,21 @@ impl Terminal {
         self.jobs.set_message(now.unwrap_or_default());
     }
 
+    fn looks_started(&self, meshes: u64) {
+        // Nothing is simplified now, so there is no rate to tell.
+        self.jobs.disable_steady_tick();
+        if self.looks.length().unwrap_or(0) == 0 {
+            self.bars.add(self.looks.clone());
+        }
+        self.looks.set_length(self.looks.length().unwrap_or(0) + meshes);
+        self.describe_looks();
+    }
+
+    fn describe_looks(&self) {
+        let (done, all) = (self.looks.position(), self.looks.length().unwrap_or(0));
+        self.looks.set_prefix(format!("looking {}/{}", count(done), count(all)));
+    }
+
     fn scene_done(&self) {
         self.describe_files(|state| state.done += 1);
     }
@@ -162,6 +179,7 @@ impl Terminal {
     }
 
     fn finished(&self, summary: &Summary) {
+        self.looks.finish_and_clear();
         self.jobs.finish_and_clear();
         self.files.finish_and_clear();
         let mut failed = std::mem::take(&mut self.state().failed);
@@ -191,6 +209,11 @@ impl Reporter for Terminal {
             Event::PlanFinished { jobs, triangles, .. } => self.planned(*jobs, *triangles),
             Event::JobStarted { mesh, triangles } => self.job_started(mesh, *triangles),
             Event::JobFinished { mesh, triangles, cached } => self.job_finished(mesh, *triangles, *cached),
+            Event::LooksStarted { meshes } => self.looks_started(*meshes),
+            Event::LookFinished => {
+                self.looks.inc(1);
+                self.describe_looks();
+            }
             Event::ScanFailed { error } => self.say(&self.paint.error_lines(error, None)),
             Event::SceneVanished { path } => self.say(&format!("removed the outputs of {path}, which is gone")),
             Event::ScenePlanned { path, reason, jobs } => {
@@ -211,6 +234,7 @@ impl Reporter for Terminal {
 impl Drop for Terminal {
     /// A bake that ends by an error leaves no half bar behind.
     fn drop(&mut self) {
+        self.looks.finish_and_clear();
         self.jobs.finish_and_clear();
         self.files.finish_and_clear();
     }

@@ -78,7 +78,7 @@ pub fn work(plan: &Plan, cache: &Cache, load: LoadLooks, reporter: &dyn Reporter
         out.warnings.extend(warning);
         out.chains.insert(key, chain);
     }
-    record_looks(plan, cache, load, &mut out);
+    record_looks(plan, cache, load, reporter, &mut out);
     out
 }
 
@@ -201,7 +201,7 @@ fn best_of(mut candidates: Vec<Chain>, difference: impl Fn(&[Option<Level>]) -> 
 }
 
 /// Figures of all chains whose looks are recorded: from the cache, or from pictures.
-fn record_looks(plan: &Plan, cache: &Cache, load: LoadLooks, out: &mut Baked) {
+fn record_looks(plan: &Plan, cache: &Cache, load: LoadLooks, reporter: &dyn Reporter, out: &mut Baked) {
     let found: Vec<(JobKey, &LookTask, Found<Vec<LevelLook>>)> =
         plan.looks.par_iter().map(|(&key, task)| (key, task, look_up(cache, Bucket::Looks, key))).collect();
     let mut missing = Vec::new();
@@ -212,6 +212,9 @@ fn record_looks(plan: &Plan, cache: &Cache, load: LoadLooks, out: &mut Baked) {
             None => missing.push((key, task)),
         }
     }
+    if !missing.is_empty() {
+        reporter.event(&Event::LooksStarted { meshes: missing.len() as u64 });
+    }
     for group in by_scene(missing, |(_, task)| task.look.scene) {
         let looks = load(group[0].1.look.scene);
         let chains = &out.chains;
@@ -221,6 +224,7 @@ fn record_looks(plan: &Plan, cache: &Cache, load: LoadLooks, out: &mut Baked) {
                 let judge = Judge::new(&plan.chains[&task.chain].parts, &task.look, &looks);
                 let figures = chains[&task.chain].levels.iter().map(|level| judge.figures(&level.parts)).collect();
                 let warning = store(cache, Bucket::Looks, key, &figures);
+                reporter.event(&Event::LookFinished);
                 (key, figures, warning)
             })
             .collect();
