@@ -27,6 +27,8 @@ const CRATES: &[(&str, &[&str], &str)] = &[
     ("tobj", &["obj"], "only obj reads OBJ"),
     ("basisu", &["appearance"], "only appearance looks into images"),
     ("image", &["appearance"], "only appearance looks into images"),
+    ("wgpu", &["appearance"], "only appearance draws"),
+    ("pollster", &["appearance"], "only appearance waits for a graphics card"),
     ("anyhow", &["command", "cli"], "errors elsewhere carry typed facts"),
     ("indicatif", &["progress"], "only progress draws bars"),
     ("clap", &["cli", "command"], "only the command line knows flags"),

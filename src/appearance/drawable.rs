@@ -121,7 +121,7 @@ impl Part {
 }
 
 /// Sets of texture coordinates beyond this are not looked for.
-const MOST_SETS: usize = 8;
+pub(super) const MOST_SETS: usize = 8;
 
 impl Drawable {
     /// Parts of one mesh where they stand in object space.

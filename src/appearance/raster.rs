@@ -7,7 +7,7 @@ use super::drawable::Part;
 use glam::{DMat4, Vec2};
 
 /// Positions on the screen are multiples of 1/256 pixel.
-const STEPS: i32 = 256;
+pub(super) const STEPS: i32 = 256;
 
 /// Farther out than this (in steps) a corner cannot be computed with; its triangle is left out. The largest picture
 /// is a quarter of it wide.
@@ -15,6 +15,10 @@ const FARTHEST: f64 = (1 << 22) as f64;
 
 /// Largest side of a picture, in pixels.
 pub const LARGEST_SIZE: u32 = 4096;
+
+/// Bits of a depth that count. Surfaces that are closer together than one part in 131,072 of their distance touch, and
+/// the first one drawn is seen: rounding in the last bits would mix them at random.
+pub(super) const TOUCHING: u32 = !0x3F;
 
 /// A vertex on the screen.
 #[derive(Clone, Copy, Debug)]
@@ -200,6 +204,7 @@ impl Visibility {
                 if (e[0] | e[1] | e[2]) >= 0 {
                     let off_x = (x * STEPS + STEPS / 2 - a[0]) as f32 * (1.0 / STEPS as f32);
                     let near = (near_row + slope_x * off_x).clamp(least, most);
+                    let near = f32::from_bits(near.to_bits() & TOUCHING);
                     let pixel = line + x as usize;
                     if near > self.near[pixel] && passes(x, y) {
                         self.near[pixel] = near;

@@ -28,6 +28,41 @@ pub enum RenderError {
     /// A size that cannot be drawn.
     #[error("pictures have 1 to {LARGEST_SIZE} pixels a side, not {0}")]
     Size(u32),
+    /// Nothing that could draw but the reference.
+    #[error("no graphics card was found")]
+    NoAdapter,
+    /// This program was built without the feature `render`.
+    #[error("this build of lodbake has no renderer for graphics cards (feature `render`)")]
+    NotBuilt,
+    /// From the graphics card's driver.
+    #[error("the graphics card failed: {0}")]
+    Device(String),
+    /// More than the card can read at once.
+    #[error("the scene needs {bytes} bytes in one piece, the graphics card has room for {most}")]
+    TooLarge {
+        /// Of the largest array.
+        bytes: u64,
+        /// That the card takes.
+        most: u64,
+    },
+}
+
+impl RenderError {
+    /// Could the reference draw what this renderer could not?
+    pub fn is_of_device(&self) -> bool {
+        !matches!(self, Self::Size(_))
+    }
+
+    /// What to do about it.
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            Self::Size(_) => None,
+            Self::NoAdapter => {
+                Some("install its Vulkan driver (Mesa's draws without a card), or use the renderer `cpu`")
+            }
+            Self::NotBuilt | Self::Device(_) | Self::TooLarge { .. } => Some("use the renderer `cpu`"),
+        }
+    }
 }
 
 /// What a picture holds.

@@ -36,9 +36,9 @@ pub struct Placed {
     /// Object space to world space.
     pub transform: DMat4,
     /// Turns directions; not to scale.
-    linear: Mat3,
+    pub(super) linear: Mat3,
     /// Turns normals, outward stays outward; not to scale.
-    normal: Mat3,
+    pub(super) normal: Mat3,
     /// The transform mirrors.
     pub mirrored: bool,
 }
@@ -62,7 +62,7 @@ fn unscaled(matrix: DMat3) -> Mat3 {
 }
 
 /// exp2(-9.28 x) at x = i / 255.
-static FALL_OFF: LazyLock<[f32; 256]> =
+pub(super) static FALL_OFF: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|i| libm::exp2(-9.28 * i as f64 / 255.0) as f32));
 
 /// Shades the pixels of one view.

@@ -49,6 +49,12 @@ impl Srgb {
         self.0.light[byte as usize]
     }
 
+    /// The least light of each byte, and behind it one that is out of reach.
+    #[cfg(feature = "render")]
+    pub(super) fn least(self) -> &'static [f32; 257] {
+        &self.0.least
+    }
+
     /// The nearest byte of some light; below 0 is 0, above 1 is 255, NaN is 0.
     #[inline]
     pub fn byte(self, light: f32) -> u8 {

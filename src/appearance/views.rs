@@ -53,6 +53,8 @@ pub struct Camera {
     /// World space to clip space: x and y are −w…w in the picture (x to the right, y up), z is between 0 and w as in
     /// WebGPU, w is the distance in front of the camera.
     pub clip: DMat4,
+    /// Nothing is nearer than this: distance in front of the camera, above 0.
+    pub near: f64,
 }
 
 impl Camera {
@@ -89,7 +91,8 @@ impl Camera {
             tw.x * scale + shift,
             tw.x,
         ]);
-        Self { eye, clip }
+        // Levels may stick out of the sphere; far less than this is for a float's exponent.
+        Self { eye, clip, near: near / 1024.0 }
     }
 
     /// One camera for each direction.

@@ -1,6 +1,7 @@
 //! An error on its way to a person: what it says, the way out, the exit code. The one place that knows every area's
 //! error type.
 
+use crate::appearance::render::RenderError;
 use crate::config::ConfigError;
 use crate::emit::EmitError;
 use crate::evaluation::SubjectError;
@@ -77,6 +78,8 @@ fn hint(error: &anyhow::Error) -> Option<String> {
         } else if let Some(error) = cause.downcast_ref::<SubjectError>() {
             owned(error.hint())
         } else if let Some(error) = cause.downcast_ref::<EmitError>() {
+            owned(error.hint())
+        } else if let Some(error) = cause.downcast_ref::<RenderError>() {
             owned(error.hint())
         } else {
             owned(cause.downcast_ref::<ReportError>()?.hint())

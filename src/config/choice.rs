@@ -116,6 +116,20 @@ choice! {
 }
 
 choice! {
+    /// What draws the pictures that are compared. Figures of a graphics card differ from those of the reference by less
+    /// than one in a hundred.
+    Renderer {
+        /// A graphics card where there is one, else `cpu`.
+        #[default]
+        Auto = "auto",
+        /// A graphics card, or a driver that acts as one.
+        Gpu = "gpu",
+        /// The reference: the same figures on every machine.
+        Cpu = "cpu",
+    }
+}
+
+choice! {
     /// Unit of a level's `error`.
     ErrorUnit {
         /// Fraction of the sub-mesh's bounding radius.

@@ -17,7 +17,7 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 
-pub use choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Storage};
+pub use choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Renderer, Storage};
 pub use error::{ConfigError, Names, Place};
 pub use file::schema;
 pub use globs::Globs;

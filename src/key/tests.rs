@@ -135,9 +135,9 @@ fn what_is_not_used_is_not_in_the_key() {
 #[test]
 fn the_key_is_the_same_on_every_machine() {
     let [sequence, chain, scene] = keys(&settings(""), MeshParts::ALL);
-    insta::assert_snapshot!(sequence, @"fbcc73903254ebba4686fc840b9e93bb0ae6930bbf969dfd3efc94f4052027e2");
-    insta::assert_snapshot!(chain, @"2d3001ca18278a72f78d56ee76bea43fda8098f240ef18fe99ee3051854e0819");
-    insta::assert_snapshot!(scene, @"8be7a1b47e4b16ac5cb1fde12252bb2723c23d98af5aeae166e722ea85b6d13f");
+    insta::assert_snapshot!(sequence, @"ca47aa622bbb69f889b15d377a5e8ba49d4e7473db86dde292d5c220df5e05c1");
+    insta::assert_snapshot!(chain, @"89f6e50281929acd0e09cb80d3a2a392c63691050162d0542b3e15004ded1553");
+    insta::assert_snapshot!(scene, @"aeb99142432dddbdc2375c6d940766f52fe13d5b11945995193b97ca31992142");
     assert_eq!(sequence.to_string().parse(), Ok(sequence));
     assert!("x".parse::<JobKey>().is_err());
 }

@@ -169,6 +169,9 @@ pub struct Summary {
     pub outputs_written: u64,
     /// Warnings told.
     pub warnings: u64,
+    /// Milliseconds of the run's wall time in which the looks of levels were measured for the record; the pictures that
+    /// decide levels (`metric = "auto"`, `effort = "best"`, targets by looks) are part of the jobs.
+    pub looks_milliseconds: u64,
 }
 
 /// Takes events, from any thread.

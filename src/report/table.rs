@@ -17,7 +17,7 @@ pub fn summary_table(report: &Report, summary: &Summary, wall: Duration) -> Stri
     if summary.dry_run || summary.baked + summary.copied == 0 {
         return sentence;
     }
-    let parts = [Some(sentence), Some(figures(report, summary)), levels(report), missed(report)];
+    let parts = [Some(sentence), Some(figures(report, summary, wall)), levels(report), missed(report)];
     parts.into_iter().flatten().collect::<Vec<_>>().join("\n\n")
 }
 
@@ -49,7 +49,7 @@ fn sentence(summary: &Summary, wall: Duration) -> String {
     format!("{} ({time})", parts.join(", "))
 }
 
-fn figures(report: &Report, summary: &Summary) -> String {
+fn figures(report: &Report, summary: &Summary, wall: Duration) -> String {
     let totals = &report.totals;
     let mut rows = vec![
         vec!["meshes found".to_owned(), count(totals.meshes_found)],
@@ -65,6 +65,14 @@ fn figures(report: &Report, summary: &Summary) -> String {
             format!("{}{}", bytes(totals.bytes_out), change(totals.bytes_in, totals.bytes_out)),
         ],
     ];
+    let looks = Duration::from_millis(summary.looks_milliseconds);
+    if !looks.is_zero() && looks <= wall {
+        let share = looks.as_secs_f64() / wall.as_secs_f64();
+        rows.push(vec![
+            "looks".to_owned(),
+            format!("measured in {}  ({share:.0} %)", duration(looks), share = 100.0 * share),
+        ]);
+    }
     if summary.warnings > 0 {
         rows.push(vec!["warnings".to_owned(), count(summary.warnings)]);
     }

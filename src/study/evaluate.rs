@@ -9,7 +9,7 @@ use std::time::Instant;
 use super::record::{DistanceFacts, LevelFacts};
 use super::statistics::Summary;
 use crate::appearance::drawable::Drawable;
-use crate::appearance::render::{Cpu, Render, RenderError, Shot};
+use crate::appearance::render::{Render, RenderError, Shot};
 use crate::appearance::soup::soup;
 use crate::appearance::views::{Camera, rhombicuboctahedron};
 use crate::compare::Corners;
@@ -33,6 +33,7 @@ pub enum EvaluateError {
 pub struct Source<'a> {
     evaluator: Evaluator<'a>,
     cameras: Vec<Camera>,
+    renderer: &'a dyn Render,
     size: u32,
     diagonal: f64,
     /// Drawn triangles.
@@ -53,13 +54,14 @@ pub fn open(file: &Path, level: usize) -> Result<Subject, SubjectError> {
 
 impl<'a> Source<'a> {
     /// Draws a source; views have `size` pixels a side.
-    pub fn new(subject: &'a Subject, size: u32) -> Result<Self, EvaluateError> {
+    pub fn new(renderer: &'a dyn Render, subject: &'a Subject, size: u32) -> Result<Self, EvaluateError> {
         let drawable = &subject.drawable;
         let cameras = Camera::all(drawable.frame(), &rhombicuboctahedron());
         Ok(Self {
-            evaluator: Evaluator::new(&Cpu, subject, Options { size, ..Options::default() })?,
-            frame_seconds: frame_seconds(drawable, &cameras, size)?,
+            evaluator: Evaluator::new(renderer, subject, Options { size, ..Options::default() })?,
+            frame_seconds: frame_seconds(renderer, drawable, &cameras, size)?,
             cameras,
+            renderer,
             size,
             diagonal: diagonal(&soup(drawable).corners),
             triangles: drawable.triangles(),
@@ -83,7 +85,7 @@ impl<'a> Source<'a> {
                 rms: self.share(surface.forward.rms.max(surface.backward.rms)),
                 max: self.share(surface.max()),
             }),
-            frame_seconds: frame_seconds(&subject.drawable, &self.cameras, self.size)?,
+            frame_seconds: frame_seconds(self.renderer, &subject.drawable, &self.cameras, self.size)?,
         })
     }
 
@@ -95,8 +97,13 @@ impl<'a> Source<'a> {
 }
 
 /// One view after the other on this thread, so that each has the machine for itself.
-fn frame_seconds(drawable: &Drawable, cameras: &[Camera], size: u32) -> Result<Option<Summary>, RenderError> {
-    let prepared = Cpu.prepare(drawable)?;
+fn frame_seconds(
+    renderer: &dyn Render,
+    drawable: &Drawable,
+    cameras: &[Camera],
+    size: u32,
+) -> Result<Option<Summary>, RenderError> {
+    let prepared = renderer.prepare(drawable)?;
     let shot = Shot { size, faces: false };
     let mut seconds = Vec::with_capacity(cameras.len());
     for camera in cameras {

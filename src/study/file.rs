@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Value;
 
+use crate::config::Renderer;
 use crate::config::file::{OneOrMany, SimplifyTable, schema_of};
 
 /// Measurements of each algorithm on each mesh and target. 20 give the t-interval 19 degrees of freedom, as in the
@@ -55,6 +56,9 @@ pub(super) struct StudyFile {
     /// Width and height of each of the 24 views, in pixels. Fewer are faster to draw, and give other figures. Default: 512.
     #[schemars(range(min = 16, max = 4096), extend("default" = SIZE))]
     pub size: Option<u32>,
+
+    /// What draws the views: `auto` (a graphics card where there is one), `gpu` or `cpu` (the reference). Default: `auto`.
+    pub renderer: Option<Renderer>,
 
     /// Name of the algorithm that the others are compared with. Default: the first.
     #[schemars(length(min = 1))]

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::appearance::renderer::REFERENCE;
+
 use super::statistics::Summary;
 
 /// The results of a study.
@@ -22,12 +24,20 @@ pub struct Record {
     pub targets: Vec<String>,
     /// Pixels a side of each view.
     pub size: u32,
+    /// What drew them: `cpu` is the reference; a graphics card is named with its driver.
+    #[serde(default = "reference")]
+    pub renderer: String,
     /// Values of `d_RMS` for which the triangles needed are told.
     pub appearance: Vec<f64>,
     /// Index of the algorithm that the others are compared with.
     pub baseline: usize,
     /// One for each mesh, target and algorithm, in this order of loops.
     pub cells: Vec<Cell>,
+}
+
+/// What drew before there was a choice.
+fn reference() -> String {
+    REFERENCE.to_owned()
 }
 
 /// A source.

@@ -8,7 +8,7 @@ use super::file::{self, AlgorithmEntry, StudyFile};
 use super::template::{Placeholder, Template};
 use crate::config::check::Document;
 use crate::config::file::OneOrMany;
-use crate::config::{ConfigError, Globs, Names, Place, SceneSettings, read_text};
+use crate::config::{ConfigError, Globs, Names, Place, Renderer, SceneSettings, read_text};
 
 /// A validated `study.toml`.
 #[derive(Clone, Debug)]
@@ -27,6 +27,8 @@ pub struct Study {
     pub appearance: Vec<f64>,
     /// Pixels a side of each view, 16…4096.
     pub size: u32,
+    /// What draws the views.
+    pub renderer: Renderer,
     /// At least one.
     pub algorithms: Vec<Algorithm>,
     /// Index of the algorithm that the others are compared with.
@@ -124,6 +126,7 @@ impl Study {
             targets,
             appearance: typed.appearance.unwrap_or_default(),
             size: typed.size.unwrap_or(file::SIZE),
+            renderer: typed.renderer.unwrap_or_default(),
             algorithms,
             baseline,
         })

@@ -8,6 +8,9 @@ use std::time::Instant;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use crate::appearance::render::{Render, RenderError};
+use crate::appearance::renderer;
+
 use super::evaluate::{EvaluateError, Source, open};
 use super::heap;
 use super::machine;
@@ -59,6 +62,9 @@ pub enum StudyError {
     /// The system gives no thread.
     #[error("failed to start a thread: {0}")]
     Thread(String),
+    /// The renderer that was asked for cannot be had.
+    #[error(transparent)]
+    Renderer(#[from] RenderError),
     /// There is no level.
     #[error(transparent)]
     Own(#[from] own::OwnError),
@@ -75,6 +81,7 @@ pub enum StudyError {
 /// Runs a study and writes its levels below its output folder. What fails is recorded and does not stop it.
 pub fn run(study: &Study, tell: &dyn Fn(Step<'_>)) -> Result<Record, StudyError> {
     let targets: Vec<String> = study.targets.iter().map(ToString::to_string).collect();
+    let chosen = renderer::open(study.renderer)?;
     let mut record = Record {
         study: study.file.clone(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -84,6 +91,7 @@ pub fn run(study: &Study, tell: &dyn Fn(Step<'_>)) -> Result<Record, StudyError>
         targets,
         appearance: study.appearance.clone(),
         size: study.size,
+        renderer: chosen.name.clone(),
         baseline: study.baseline,
         cells: Vec::new(),
     };
@@ -94,7 +102,8 @@ pub fn run(study: &Study, tell: &dyn Fn(Step<'_>)) -> Result<Record, StudyError>
     for (number, mesh) in study.meshes.iter().enumerate() {
         tell(Step::Mesh(&mesh.name, number + 1, study.meshes.len()));
         let folder = study.output.join("levels").join(&mesh_names[number]);
-        let bench = Bench { study, mesh, folder, files: &files, alone: &alone, number, tell };
+        let bench =
+            Bench { study, renderer: &*chosen.renderer, mesh, folder, files: &files, alone: &alone, number, tell };
         bench.run(&mut record)?;
     }
     Ok(record)
@@ -116,6 +125,8 @@ fn facts_of(algorithm: &Algorithm, study: &Study) -> AlgorithmFacts {
 /// Everything about one mesh.
 struct Bench<'a> {
     study: &'a Study,
+    /// Draws the views.
+    renderer: &'a dyn Render,
     mesh: &'a MeshFile,
     /// For its levels.
     folder: PathBuf,
@@ -137,7 +148,7 @@ impl Bench<'_> {
     fn run(&self, record: &mut Record) -> Result<(), StudyError> {
         let subject = open(&self.mesh.path, 0).map_err(EvaluateError::from);
         let source = match &subject {
-            Ok(subject) => Source::new(subject, self.study.size).map_err(|error| error.to_string()),
+            Ok(subject) => Source::new(self.renderer, subject, self.study.size).map_err(|error| error.to_string()),
             Err(error) => Err(error.to_string()),
         };
         let error = source.as_ref().err().cloned();

@@ -237,8 +237,9 @@ fn looks(record: &Record) -> Section {
     tables.extend(triangles_needed(record));
     let words = format!(
         "d_RMS: root mean square of luminance differences to the source over 24 views of {0} × {0} pixels, 0 to 255; less is \
-         closer. In brackets the triangles reached. Plots leave out algorithms that are asked for another's counts.",
-        record.size
+         closer. In brackets the triangles reached. Plots leave out algorithms that are asked for another's counts. Drawn \
+         by: {1}.",
+        record.size, record.renderer
     );
     Section { title: "Looks".to_owned(), words: vec![words], plots: against_triangles(record, &D_RMS), tables }
 }
@@ -363,10 +364,10 @@ fn frames(record: &Record) -> Section {
         table.title = format!("{}; the source: {}", table.title, rate.unwrap_or_else(|| NONE.to_owned()));
     }
     let words = format!(
-        "Renderings per second by the renderer that judges looks, which runs on the processor: 24 views of {0} × {0} pixels, \
-         one thread. It spends most of its time on pixels, so levels gain less than on a graphics card that is short of \
+        "Renderings per second by the renderer that judges looks ({1}): 24 views of {0} × {0} pixels, one after the other, \
+         each read back. Most of the time goes into pixels, so levels gain less than on a graphics card that is short of \
          vertices.",
-        record.size
+        record.size, record.renderer
     );
     Section { title: "Frames per second".to_owned(), words: vec![words], plots: Vec::new(), tables }
 }

@@ -101,7 +101,7 @@ fn mistakes_are_told_with_their_line() {
         ),
         (
             "meshes = \"../one.glb\"\noutput = \"o\"\nratio = [0.5]\n",
-            "unknown key `ratio` in `study.toml` line 3 (did you mean `ratios`? known: `meshes`, `output`, `ratios`, `triangles`, `appearance`, `repetitions`, `timeout`, `size`, `baseline`, `algorithm`)",
+            "unknown key `ratio` in `study.toml` line 3 (did you mean `ratios`? known: `meshes`, `output`, `ratios`, `triangles`, `appearance`, `repetitions`, `timeout`, `size`, `renderer`, `baseline`, `algorithm`)",
         ),
         (
             &format!("{HEAD}repetitions = 0\n{OWN}"),
@@ -209,6 +209,7 @@ fn record() -> Record {
         ],
         targets: vec!["0.5".to_owned(), "100 triangles".to_owned()],
         appearance: vec![2.0, 50.0],
+        renderer: "cpu".into(),
         size: 512,
         baseline: 0,
         cells: Vec::new(),

@@ -9,6 +9,7 @@ mod look;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -43,6 +44,8 @@ pub struct Baked {
     pub jobs: usize,
     /// Sub-meshes whose results came from the cache.
     pub hits: usize,
+    /// Wall time in which looks were measured for the record.
+    pub looked: Duration,
     /// Damaged entries and results that could not be stored; the bake is whole all the same.
     pub warnings: Vec<String>,
 }
@@ -78,7 +81,9 @@ pub fn work(plan: &Plan, cache: &Cache, load: LoadLooks, reporter: &dyn Reporter
         out.warnings.extend(warning);
         out.chains.insert(key, chain);
     }
+    let began = Instant::now();
     record_looks(plan, cache, load, reporter, &mut out);
+    out.looked = began.elapsed();
     out
 }
 

@@ -155,6 +155,7 @@ impl Session<'_> {
         let baked = work(&plan, &self.cache, &load, &*self.context.reporter);
         self.summary.jobs += baked.jobs as u64;
         self.summary.cache_hits += baked.hits as u64;
+        self.summary.looks_milliseconds += baked.looked.as_millis() as u64;
         for warning in &baked.warnings {
             self.warn_run(warning);
         }
