@@ -179,7 +179,8 @@ pub(super) struct AppearanceTable {
     #[schemars(extend("default" = true))]
     pub record: Option<bool>,
 
-    /// Pixels on each side of the pictures. Default: 128.
+    /// Pixels on each side of the pictures. Default: 64; 128 where looks decide levels (`metric = "auto"`,
+    /// `effort = "best"`, levels by `appearance`).
     #[schemars(range(min = 32, max = 2048), extend("default" = defaults::LOOK_SIZE))]
     pub size: Option<u32>,
 }

@@ -51,7 +51,7 @@ impl Layer {
             }
             None => (defaults::RATIOS.map(LevelTarget::Ratio).to_vec(), None),
         };
-        SceneSettings {
+        let mut settings = SceneSettings {
             skip: self.skip.unwrap_or(false),
             min_triangles: self.simplify.min_triangles.unwrap_or(defaults::MIN_TRIANGLES) as usize,
             simplify: self.simplify_settings(storage),
@@ -70,7 +70,11 @@ impl Layer {
                 record: self.appearance.record.unwrap_or(true),
                 size: self.appearance.size.unwrap_or(defaults::LOOK_SIZE),
             },
+        };
+        if self.appearance.size.is_none() && settings.looks_decide() {
+            settings.appearance.size = defaults::DECIDING_LOOK_SIZE;
         }
+        settings
     }
 
     fn simplify_settings(&self, storage: Storage) -> SimplifySettings {

@@ -73,16 +73,20 @@ const CASES: [(&str, &[&str], &str); 25] = [
     (
         "simplify = { metric = 'auto', candidates = 5 }",
         ALL,
-        "simplify.metric: its -> auto; simplify.candidates: (none) -> 5",
+        "simplify.metric: its -> auto; simplify.candidates: (none) -> 5; look_size: 64 -> 128",
     ),
     (
         "lod = [{ ratio = 0.5 }, { pixels = 1, size = 300 }, { appearance = 4 }]",
         LEVELS,
-        "lod[1].pixels: (none) -> 1.0; lod[1].size: (none) -> 300.0; lod[2].appearance: (none) -> 4.0; lod[1].ratio: 0.25 -> (none); lod[2].ratio: 0.1 -> (none)",
+        "lod[1].pixels: (none) -> 1.0; lod[1].size: (none) -> 300.0; lod[2].appearance: (none) -> 4.0; look_size: 64 -> 128; lod[1].ratio: 0.25 -> (none); lod[2].ratio: 0.1 -> (none)",
     ),
-    ("appearance.record = false", SCENE, "record_looks: true -> false; look_size: 128 -> (none)"),
-    ("appearance.size = 256", SCENE, "look_size: 128 -> 256"),
-    ("simplify.metric = 'auto'", ALL, "simplify.metric: its -> auto; simplify.candidates: (none) -> 3"),
+    ("appearance.record = false", SCENE, "record_looks: true -> false; look_size: 64 -> (none)"),
+    ("appearance.size = 256", SCENE, "look_size: 64 -> 256"),
+    (
+        "simplify.metric = 'auto'",
+        ALL,
+        "simplify.metric: its -> auto; simplify.candidates: (none) -> 3; look_size: 64 -> 128",
+    ),
     ("format = 'glb'", SCENE, "format: source -> glb"),
     ("profile = 'unity'", SCENE, "profile: web -> unity"),
     ("screen.pixels = 2", SCENE, "screen.pixels: 1.0 -> 2.0"),
@@ -137,7 +141,7 @@ fn the_key_is_the_same_on_every_machine() {
     let [sequence, chain, scene] = keys(&settings(""), MeshParts::ALL);
     insta::assert_snapshot!(sequence, @"ca47aa622bbb69f889b15d377a5e8ba49d4e7473db86dde292d5c220df5e05c1");
     insta::assert_snapshot!(chain, @"89f6e50281929acd0e09cb80d3a2a392c63691050162d0542b3e15004ded1553");
-    insta::assert_snapshot!(scene, @"aeb99142432dddbdc2375c6d940766f52fe13d5b11945995193b97ca31992142");
+    insta::assert_snapshot!(scene, @"c6782d4fcaeb8c52fa7ff74b935887ed796f05659994fac29c2804cfbb8b7fb3");
     assert_eq!(sequence.to_string().parse(), Ok(sequence));
     assert!("x".parse::<JobKey>().is_err());
 }
