@@ -9,7 +9,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::command::failure::{Failure, UsageError};
 use crate::command::{
-    CacheChoice, Context, Exit, bake, cache, completions, evaluate, explain, init, inspect, schema, study,
+    CacheChoice, Context, Exit, bake, cache, check, completions, diff, evaluate, explain, init, inspect, schema, study,
 };
 use crate::progress::{JsonLines, Lines, Paint, Reporter, Terminal, Verbosity};
 
@@ -82,6 +82,10 @@ enum ColorChoice {
 enum Command {
     /// Bake the scenes of a pipeline
     Bake(bake::Bake),
+    /// Hold what was baked against the budgets of a pipeline
+    Check(check::Check),
+    /// Tell what changed between two reports or revisions
+    Diff(diff::Diff),
     /// Write a commented pipeline to start from
     Init(init::Init),
     /// Show what is in a scene, and what a bake would save
@@ -119,6 +123,8 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> Exit {
     let context = cli.global.settle();
     let done = match &cli.command {
         Command::Bake(command) => command.run(&context),
+        Command::Check(command) => command.run(&context),
+        Command::Diff(command) => command.run(&context),
         Command::Init(command) => command.run(&context),
         Command::Evaluate(command) => command.run(&context),
         Command::Explain(command) => command.run(&context),

@@ -9,6 +9,10 @@ mod space;
 mod bake;
 #[path = "e2e/cache.rs"]
 mod cache;
+#[path = "e2e/check.rs"]
+mod check;
+#[path = "e2e/diff.rs"]
+mod diff;
 #[path = "e2e/explain.rs"]
 mod explain;
 #[path = "e2e/init.rs"]

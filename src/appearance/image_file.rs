@@ -24,6 +24,17 @@ pub struct Decoded {
     pub texels: Vec<[u8; 4]>,
 }
 
+/// Width and height in texels, from the header alone; `None` for formats that are not known.
+pub fn dimensions(bytes: &[u8]) -> Option<[u32; 2]> {
+    if bytes.starts_with(&KTX2) {
+        let at = |from: usize| Some(u32::from_le_bytes(bytes.get(from..from + 4)?.try_into().ok()?));
+        return Some([at(20)?, at(24)?]);
+    }
+    let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok()?;
+    let (width, height) = reader.into_dimensions().ok()?;
+    Some([width, height])
+}
+
 /// Decodes an image file of any known format; what is wrong with it, in words.
 pub fn decode(bytes: &[u8]) -> Result<Decoded, String> {
     if bytes.starts_with(&KTX2) {

@@ -137,7 +137,7 @@ fn image_of(document: &Document, texture: usize, notes: &mut Vec<Warning>) -> Op
 }
 
 /// The file of an image.
-fn image_bytes<'a>(
+pub(super) fn image_bytes<'a>(
     document: &'a Document,
     views: &'a Views<'_>,
     base: &Path,

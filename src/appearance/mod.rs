@@ -12,6 +12,7 @@ pub mod fingerprint;
 #[cfg(feature = "render")]
 pub mod gpu;
 pub mod image_file;
+pub mod images;
 pub mod looks;
 pub mod material;
 pub mod metric;

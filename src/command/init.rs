@@ -1,8 +1,9 @@
-//! `lodbake init`: writes a commented pipeline, the one that bakes lodbake's own sample scenes.
+//! `lodbake init`: writes a commented pipeline, the one that bakes lodbake's own sample scenes; and a git hook.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::Context as _;
 
@@ -32,14 +33,30 @@ pub struct Init {
     /// The folder for the baked scenes
     #[arg(long, value_name = "DIR", default_value = "out")]
     output: String,
-    /// Replace a file that is there
+    /// Also check the budgets before each commit: write a git hook
+    #[arg(long)]
+    hook: bool,
+    /// Replace files that are there
     #[arg(long)]
     force: bool,
 }
 
+/// The first line of the hook after the shell's: by it the hook is known as ours.
+const HOOK_MARK: &str = "# Written by `lodbake init --hook`.";
+
 impl Init {
-    /// Writes the file.
+    /// Writes the file, and the hook if it is asked for. With `--hook`, a pipeline that is there stays as it is: `--force` is then about the hook.
     pub fn run(&self, context: &Context) -> anyhow::Result<Exit> {
+        if !self.hook || !self.file.exists() {
+            self.write_pipeline(context)?;
+        }
+        if self.hook {
+            self.write_hook(context)?;
+        }
+        Ok(Exit::Fine)
+    }
+
+    fn write_pipeline(&self, context: &Context) -> anyhow::Result<()> {
         let shown = self.file.display();
         let text = self.text();
         // A file that this command wrote must be one that `bake` takes.
@@ -55,7 +72,35 @@ impl Init {
             written => written.with_context(|| format!("failed to write `{shown}`"))?,
         }
         context.tell(&format!("wrote `{shown}`; bake it with `lodbake {shown}`"));
-        Ok(Exit::Fine)
+        Ok(())
+    }
+
+    /// A hook of someone else is left alone: it is told what to add.
+    fn write_hook(&self, context: &Context) -> anyhow::Result<()> {
+        let pipeline = git(&["rev-parse", "--show-prefix"])?;
+        let pipeline = format!("{pipeline}{}", self.file.display()).replace('\\', "/");
+        let path = PathBuf::from(git(&["rev-parse", "--git-path", "hooks/pre-commit"])?);
+        let shown = path.display();
+        if let Ok(old) = fs::read_to_string(&path)
+            && !old.contains(HOOK_MARK)
+            && !self.force
+        {
+            let hint = Some(format!("add the line `lodbake check {pipeline}` to it, or replace it with `--force`"));
+            return Err(UsageError { message: format!("`{shown}` is there already"), hint }.into());
+        }
+        let written = || {
+            fs::create_dir_all(path.parent().unwrap_or(Path::new("")))?;
+            fs::write(&path, hook(&pipeline))?;
+            #[cfg(unix)]
+            {
+                use std::os::unix::fs::PermissionsExt;
+                fs::set_permissions(&path, fs::Permissions::from_mode(0o755))?;
+            }
+            Ok::<_, io::Error>(())
+        };
+        written().with_context(|| format!("failed to write `{shown}`"))?;
+        context.tell(&format!("wrote `{shown}`: each commit checks the budgets of `{pipeline}`"));
+        Ok(())
     }
 
     /// Of two that run at the same time only one makes the file.
@@ -77,11 +122,35 @@ impl Init {
             &format!("output = {}", quoted(&self.output)),
             1,
         );
-        // The override names a folder of the samples: elsewhere it is shown as a comment.
+        // What names folders and limits of the samples is shown as a comment elsewhere.
         let (start, samples) = text.split_at(text.find(SAMPLES_ONLY).unwrap_or(text.len()));
-        let samples: Vec<String> = samples.lines().map(|line| format!("#{line}\n")).collect();
+        let comment = |line: &str| if line.is_empty() || line.starts_with('#') { "" } else { "#" };
+        let samples: Vec<String> = samples.lines().map(|line| format!("{}{line}\n", comment(line))).collect();
         format!("{start}{}", samples.concat())
     }
+}
+
+/// A script for any shell that git has. Hooks run at the top of the repository; `pipeline` is seen from there.
+fn hook(pipeline: &str) -> String {
+    let quoted = format!("'{}'", pipeline.replace('\'', "'\\''"));
+    format!(
+        "#!/bin/sh\n{HOOK_MARK}\n# Holds scenes that are about to be committed against the budgets of a pipeline.\n\
+         set -e\npipeline={quoted}\n\
+         if ! git diff --cached --quiet --no-ext-diff -- \"$pipeline\"; then\n  exec lodbake check \"$pipeline\"\nfi\n\
+         git diff --cached --name-only --no-ext-diff --diff-filter=ACMRT -z -- \\\n    \
+         '*.glb' '*.gltf' '*.bin' '*.obj' '*.png' '*.jpg' '*.jpeg' '*.webp' '*.ktx2' |\n  \
+         xargs -0 -r lodbake check \"$pipeline\" --\n"
+    )
+}
+
+/// One line that git says about the repository that the pipeline is in.
+fn git(words: &[&str]) -> anyhow::Result<String> {
+    let run = Command::new("git").args(words).output().context("failed to run `git`")?;
+    if !run.status.success() {
+        let message = "this folder is in no git repository".to_owned();
+        return Err(UsageError { message, hint: Some("`git init` makes one".to_owned()) }.into());
+    }
+    Ok(String::from_utf8_lossy(&run.stdout).trim_end_matches(['\n', '\r']).to_owned())
 }
 
 #[cfg(test)]
@@ -94,7 +163,13 @@ mod tests {
     }
 
     fn init(input: &str) -> Init {
-        Init { file: "pipeline.toml".into(), input: input.to_owned(), output: "o".to_owned(), force: false }
+        Init {
+            file: "pipeline.toml".into(),
+            input: input.to_owned(),
+            output: "o".to_owned(),
+            hook: false,
+            force: false,
+        }
     }
 
     /// The example with every `#key = value` line made a setting.
@@ -114,13 +189,17 @@ mod tests {
         assert_eq!((spelled.ignore_files, spelled.follow_links), (short.ignore_files, short.follow_links));
         assert_eq!(spelled.include.patterns(), defaults::INCLUDE);
         assert_eq!(example.settings_for("props/vase.glb").simplify.weights.normal, 0.01);
+        assert_eq!((example.budgets.len(), parse(&init("in").text()).budgets.len()), (2, 0));
+        let limited: usize = spelled.budgets[0].limits().len();
+        assert_eq!(limited, crate::config::Fact::ALL.len(), "every fact has its line");
     }
 
     #[test]
     fn the_example_names_every_key() {
         let schema = schema();
-        let tables = ["", "/$defs/ScreenTable", "/$defs/SimplifyTable", "/$defs/LodEntry", "/$defs/OverrideEntry"];
-        for table in tables {
+        let tables = ["Screen", "Simplify", "Appearance", "Limit", "Growth"].map(|name| format!("/$defs/{name}Table"));
+        let entries = ["Lod", "Override", "Budget"].map(|name| format!("/$defs/{name}Entry"));
+        for table in tables.iter().chain(&entries).map(String::as_str).chain([""]) {
             for key in schema.pointer(table).unwrap()["properties"].as_object().unwrap().keys() {
                 assert!(EXAMPLE.contains(key.as_str()), "`{key}` is not in pipeline.toml");
             }

@@ -5,12 +5,15 @@
 
 pub mod bake;
 pub mod cache;
+pub mod check;
 pub mod completions;
+pub mod diff;
 pub mod evaluate;
 pub mod explain;
 pub mod failure;
 pub mod init;
 pub mod inspect;
+mod recorded;
 pub mod schema;
 pub mod study;
 
@@ -18,7 +21,7 @@ use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use crate::progress::{Paint, Reporter};
+use crate::progress::{Paint, Reporter, Silent};
 use failure::{Failure, OutputClosed};
 
 /// Exit codes, a promise to scripts.
@@ -73,6 +76,21 @@ impl Context {
         match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
             Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Err(OutputClosed.into()),
             written => written.map_err(|error| anyhow::Error::new(error).context("failed to write the output")),
+        }
+    }
+
+    /// The same for work before a command's own: it tells nothing.
+    pub fn silent(&self) -> Self {
+        let (cache, reporter) = (self.cache.clone(), Box::new(Silent));
+        Self {
+            jobs: self.jobs,
+            cache,
+            json: false,
+            quiet: true,
+            verbose: false,
+            paint: self.paint,
+            paint_told: self.paint_told,
+            reporter,
         }
     }
 

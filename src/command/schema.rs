@@ -1,7 +1,7 @@
 //! `lodbake schema KIND`: the JSON schema of a file that lodbake reads or writes, for editors and other programs.
 
 use super::{Context, Exit};
-use crate::{config, evaluation, progress, report, study};
+use crate::{config, difference, evaluation, progress, report, study};
 
 /// Write the JSON schema of a file format
 #[derive(Clone, Debug, clap::Args)]
@@ -20,6 +20,10 @@ enum Kind {
     Report,
     /// One line of `lodbake bake --json`
     Events,
+    /// `lodbake check --json`
+    Check,
+    /// `lodbake diff --json`
+    Diff,
     /// `lodbake inspect --json FILE`
     Inspection,
     /// `lodbake evaluate --json REFERENCE CANDIDATE`
@@ -38,6 +42,8 @@ impl Schema {
             Kind::Report => report::schema(),
             Kind::Events => progress::schema(),
             Kind::Evaluation => evaluation::schema(),
+            Kind::Check => super::check::schema(),
+            Kind::Diff => difference::schema(),
             Kind::Inspection => report::inspection::schema(),
             Kind::Study => study::schema(),
             Kind::StudyRecord => study::record_schema(),

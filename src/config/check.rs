@@ -40,6 +40,11 @@ impl<'a> Document<'a> {
         ConfigError::Invalid { file: self.file.to_owned(), line, place: place.clone(), cause: cause.into() }
     }
 
+    /// The line of the value at `place`, from 1.
+    pub fn line_of(&self, place: &Place) -> usize {
+        self.line(&self.span(place))
+    }
+
     fn span(&self, place: &Place) -> Range<usize> {
         let mut table = Some(self.root.get_ref());
         let mut array = None;
@@ -105,7 +110,7 @@ impl<'a> Document<'a> {
     fn check_value(&self, value: &Spanned<DeValue<'_>>, schema: &Value, place: &Place) -> Result<(), ConfigError> {
         let schema = self.target(schema);
         if let Some(cases) = schema.get("anyOf").and_then(Value::as_array) {
-            return match cases.iter().find(|case| kind_fits(value.get_ref(), case)) {
+            return match cases.iter().find(|case| kind_fits(value.get_ref(), self.target(case))) {
                 Some(case) => self.check_value(value, case, place),
                 None => Err(self.wrong_kind(value, cases, place)),
             };

@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::budget::BudgetEntry;
 use super::choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Storage};
 use super::defaults;
 
@@ -99,6 +100,13 @@ pub(super) struct PipelineFile {
     /// Other settings for some of the scenes; later entries win, key by key.
     #[serde(rename = "override")]
     pub overrides: Option<Vec<OverrideEntry>>,
+
+    /// Limits that `lodbake check` holds scenes against; of several for the same fact, the last one counts.
+    pub budget: Option<Vec<BudgetEntry>>,
+
+    /// A report that growth is measured against, as a rule kept under version control. Default: none.
+    #[schemars(length(min = 1))]
+    pub baseline: Option<String>,
 }
 
 /// When a level is good enough to be shown: its error, seen on this screen, covers at most `pixels`.

@@ -4,6 +4,7 @@
 //! rules between keys are applied (`resolve.rs`), and [`Pipeline::settings_for`] lays overrides over each other for one
 //! scene. Reads that one file; knows nothing of scenes, meshes or the cache.
 
+mod budget;
 pub(crate) mod check;
 mod choice;
 pub mod defaults;
@@ -17,6 +18,7 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 
+pub use budget::{Bounds, Budget, Fact, Limit};
 pub use choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Renderer, Storage};
 pub use error::{ConfigError, Names, Place};
 pub use file::schema;
@@ -72,6 +74,10 @@ pub struct Pipeline {
     pub cache: Folder,
     /// Jobs at the same time; 0 means one for each core.
     pub jobs: usize,
+    /// In the order of the file.
+    pub budgets: Vec<Budget>,
+    /// A report that growth is measured against.
+    pub baseline: Option<Folder>,
     layer: resolve::Layer,
     overrides: Vec<(Globs, resolve::Layer)>,
 }

@@ -11,7 +11,7 @@ use super::globs::Globs;
 use super::settings::{
     AppearanceSettings, ChainSettings, EmitSettings, LevelTarget, SceneSettings, Screen, SimplifySettings, Weights,
 };
-use super::{Folder, Pipeline, defaults};
+use super::{Folder, Pipeline, budget, defaults};
 
 /// The settings that an override may change; an absent key leaves what is below it.
 #[derive(Clone, Debug, Default)]
@@ -133,6 +133,10 @@ pub(super) fn pipeline(document: &Document<'_>, file: &str) -> Result<Pipeline, 
     for (i, entry) in typed.overrides.unwrap_or_default().into_iter().enumerate() {
         overrides.push(override_layer(document, &top.key("override").index(i), entry)?);
     }
+    let mut budgets = Vec::new();
+    for (i, entry) in typed.budget.unwrap_or_default().into_iter().enumerate() {
+        budgets.push(budget::resolve(document, &top.key("budget").index(i), entry)?);
+    }
     Ok(Pipeline {
         file: file.to_owned(),
         inputs,
@@ -143,6 +147,8 @@ pub(super) fn pipeline(document: &Document<'_>, file: &str) -> Result<Pipeline, 
         follow_links: typed.follow_links.unwrap_or(true),
         cache,
         jobs: typed.jobs.unwrap_or(0) as usize,
+        budgets,
+        baseline: typed.baseline.map(|written| Folder::below(&base, written)),
         layer,
         overrides,
     })
@@ -165,7 +171,7 @@ fn override_layer(document: &Document<'_>, place: &Place, entry: OverrideEntry) 
     Ok((globs, layer))
 }
 
-fn globs(document: &Document<'_>, place: &Place, patterns: Vec<String>) -> Result<Globs, ConfigError> {
+pub(super) fn globs(document: &Document<'_>, place: &Place, patterns: Vec<String>) -> Result<Globs, ConfigError> {
     let written = patterns.clone();
     Globs::new(patterns).map_err(|(index, cause)| {
         let pattern = written.get(index).map_or("", String::as_str);

@@ -51,11 +51,11 @@ fn paths_are_relative_to_the_file() {
 
 #[test]
 fn unknown_keys_name_the_nearest() {
-    insta::assert_snapshot!(refused("sotrage = 'shared'"), @"unknown key `sotrage` in `project/pipeline.toml` line 3 (did you mean `storage`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `lod`, `override`)");
+    insta::assert_snapshot!(refused("sotrage = 'shared'"), @"unknown key `sotrage` in `project/pipeline.toml` line 3 (did you mean `storage`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `lod`, `override`, `budget`, `baseline`)");
     insta::assert_snapshot!(refused("[screen]\npixel = 2"), @"unknown key `screen.pixel` in `project/pipeline.toml` line 4 (did you mean `pixels`? known: `pixels`, `height`, `fov`)");
     insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\n[[lod]]\ntriangle = 5"), @"unknown key `lod[1].triangle` in `project/pipeline.toml` line 6 (did you mean `triangles`? known: `ratio`, `triangles`, `error`, `unit`, `pixels`, `size`, `appearance`, `coverage`)");
     insta::assert_snapshot!(refused("normal = 0.1"), @r"
-    unknown key `normal` in `project/pipeline.toml` line 3 (did you mean `format`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `lod`, `override`)
+    unknown key `normal` in `project/pipeline.toml` line 3 (did you mean `format`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `lod`, `override`, `budget`, `baseline`)
     hint: `normal` is a key of `[simplify]`
     ");
     insta::assert_snapshot!(refused("[simplify]\nseam = 1\njobs = 2"), @r"
@@ -243,4 +243,39 @@ fn schema_states_the_defaults() {
         (short.jobs, short.ignore_files, short.follow_links)
     );
     assert!(text.contains("fov") && text.contains("min_triangles") && text.contains("vertex_cache"), "{text}");
+}
+
+#[test]
+fn budgets_have_their_rules() {
+    let said = |rest: &str| refused(&format!("[[budget]]\n{rest}"));
+    insta::assert_snapshot!(said("triangle = 5"), @"unknown key `budget[0].triangle` in `project/pipeline.toml` line 4 (did you mean `triangles`? known: `match`, `level`, `triangles`, `vertices`, `d_rms`, `surface`, `levels`, `min_levels`, `scene_triangles`, `distinct_triangles`, `scene_vertices`, `draw_calls`, `materials`, `texture_size`, `file_bytes`, `geometry_bytes`, `texture_bytes`, `undeclared`)");
+    insta::assert_snapshot!(said("match = 'a/**'"), @"`project/pipeline.toml` line 3: budget[0] limits nothing: it needs one or more of `triangles`, `vertices`, `d_rms`, `surface`, `levels`, `min_levels`, `scene_triangles`, `distinct_triangles`, `scene_vertices`, `draw_calls`, `materials`, `texture_size`, `file_bytes`, `geometry_bytes`, `texture_bytes`, `undeclared`");
+    insta::assert_snapshot!(said("triangles = { warn = 5, error = 4 }"), @"`project/pipeline.toml` line 4: budget[0].triangles has warn 5 beyond error 4: the warning would never come");
+    insta::assert_snapshot!(said("triangles = 'many'"), @"`project/pipeline.toml` line 4: budget[0].triangles must be a number or a table, not a string");
+    insta::assert_snapshot!(said("triangles = -1"), @"`project/pipeline.toml` line 4: budget[0].triangles -1 is out of range: must be 0 or more");
+    insta::assert_snapshot!(said("triangles = {}"), @"`project/pipeline.toml` line 4: budget[0].triangles has no limit: give `warn`, `error`, `grow_percent` or `grow_by`");
+    insta::assert_snapshot!(said("triangles = { eror = 1 }"), @"unknown key `budget[0].triangles.eror` in `project/pipeline.toml` line 4 (did you mean `error`? known: `warn`, `error`, `grow_percent`, `grow_by`)");
+    insta::assert_snapshot!(said("min_levels = { grow_by = 1 }"), @"`project/pipeline.toml` line 4: budget[0].min_levels is a least number and cannot have a limit on growth");
+    insta::assert_snapshot!(said("d_rms = { grow_percent = { warn = 9, error = 3 } }"), @"`project/pipeline.toml` line 4: budget[0].d_rms.grow_percent has warn 9 beyond error 3: the warning would never come");
+    insta::assert_snapshot!(said("level = [33]\ntriangles = 1"), @"`project/pipeline.toml` line 4: budget[0].level[0] 33 is out of range: must be between 0 and 32, both inclusive");
+    insta::assert_snapshot!(said("match = 'b['\ntriangles = 1"), @"`project/pipeline.toml` line 4: budget[0].match[0] `b[` is not a glob: unclosed character class; missing ']'");
+}
+
+#[test]
+fn budgets_know_their_scenes_levels_and_lines() {
+    let text = "[[budget]]\nmatch = 'props/**'\nlevel = [1, 2]\ntriangles = 900\nscene_triangles = { warn = 3.5 }\n\
+                [[budget]]\nd_rms = { error = 8, grow_percent = 10, grow_by = { warn = 0.5, error = 1 } }\nscene_triangles = 7";
+    let pipeline = minimal(text).unwrap();
+    let [props, all] = &pipeline.budgets[..] else { panic!("two budgets") };
+    assert!(props.matches("props/a.glb") && !props.matches("a.glb") && all.matches("a.glb"));
+    let limit = props.limit(Fact::Triangles, Some(2)).unwrap();
+    assert_eq!((limit.at, limit.line), (Bounds { warn: None, error: Some(900.0) }, 6));
+    assert_eq!(props.limit(Fact::Triangles, Some(0)), None);
+    assert_eq!(props.limit(Fact::SceneTriangles, Some(1)).map(|l| l.at.warn), Some(Some(3.5)));
+    assert_eq!(all.limit(Fact::SceneTriangles, Some(1)), None);
+    assert!(all.limit(Fact::SceneTriangles, Some(0)).is_some());
+    let looks = all.limit(Fact::DRms, Some(3)).unwrap();
+    assert_eq!(looks.grow_percent, Bounds { warn: None, error: Some(10.0) });
+    assert_eq!(looks.grow_by, Bounds { warn: Some(0.5), error: Some(1.0) });
+    assert_eq!(minimal("baseline = 'base.json'").unwrap().baseline.unwrap().path, Path::new("project/base.json"));
 }

@@ -191,14 +191,19 @@ impl Index {
 
     /// Looks at file facts only. Call it before the scene is read: it notes the time of the run's first reading.
     pub fn status(&self, scene: &SceneFile, settings: &SettingsKey) -> Status<'_> {
-        let status = self.look(scene, settings);
+        let status = self.look(scene, settings, true);
         if !matches!(status, Status::Unchanged(_)) {
             self.started_ns.get_or_init(|| store::file_system_time(&self.file));
         }
         status
     }
 
-    fn look(&self, scene: &SceneFile, settings: &SettingsKey) -> Status<'_> {
+    /// As [`Self::status`], for what is remembered of a scene and not for its outputs: they may be gone. Writes nothing.
+    pub fn knows(&self, scene: &SceneFile, settings: &SettingsKey) -> Status<'_> {
+        self.look(scene, settings, false)
+    }
+
+    fn look(&self, scene: &SceneFile, settings: &SettingsKey, with_outputs: bool) -> Status<'_> {
         let Some(entry) = self.entries.get(&scene.relative) else { return Status::New };
         let mut reasons = Vec::new();
         if entry.settings != settings.key {
@@ -223,7 +228,7 @@ impl Index {
                 None => {}
             }
         }
-        for output in &entry.outputs {
+        for output in entry.outputs.iter().filter(|_| with_outputs) {
             // Outputs are younger than the run that wrote them, and nothing else should write them: never too young.
             match compare(&output.seen, FileStat::of(&self.output.join(&output.relative)).ok(), None) {
                 Compared::Same => {}
@@ -241,6 +246,15 @@ impl Index {
 
     /// Hashes what [`Status::Touched`] could not tell. Errors of reading count as a change: the bake will tell them.
     pub fn recheck(&self, scene: &SceneFile, entry: &Entry) -> Recheck {
+        self.rehash(scene, entry, true)
+    }
+
+    /// As [`Self::recheck`], for a scene that [`Self::knows`] is not sure of. Its outputs are not read.
+    pub fn recheck_sources(&self, scene: &SceneFile, entry: &Entry) -> Recheck {
+        self.rehash(scene, entry, false)
+    }
+
+    fn rehash(&self, scene: &SceneFile, entry: &Entry, with_outputs: bool) -> Recheck {
         let mut checked = Recheck { read_bytes: 0, reasons: Vec::new(), entry: entry.clone() };
         let (read_bytes, reasons) = (&mut checked.read_bytes, &mut checked.reasons);
         let mut same = |path: &Path, seen: &mut Seen, read_ns: Option<i64>| {
@@ -268,7 +282,7 @@ impl Index {
                 reasons.push(Reason::DependencyChanged(dependency.relative.clone()));
             }
         }
-        for output in &mut entry.outputs {
+        for output in entry.outputs.iter_mut().filter(|_| with_outputs) {
             if !same(&self.output.join(&output.relative), &mut output.seen, None) {
                 reasons.push(Reason::OutputChanged(output.relative.clone()));
             }

@@ -43,6 +43,35 @@ fn scaled(number: f64, units: &[&str]) -> String {
     format!("{value:.digits$}{}", units[unit])
 }
 
+/// Three significant digits, thousands separated: `1.23e-5`, `0.00123`, `1.20`, `45.6`, `1,234`; trailing zeros stay, so
+/// that columns line up.
+pub fn number(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if value.abs() < 1e-4 {
+        let text = format!("{:.2e}", value.abs());
+        return if value < 0.0 { format!("−{text}") } else { text };
+    }
+    with_digits(value, decimals(value))
+}
+
+/// Decimals that leave three significant digits.
+pub(crate) fn decimals(value: f64) -> usize {
+    // Rounded first, as 9.996 has three digits as 10.0.
+    let rounded: f64 = format!("{:.2e}", value.abs()).parse().unwrap_or(1.0);
+    (2.0 - libm::floor(libm::log10(rounded))).clamp(0.0, 9.0) as usize
+}
+
+/// With thousands separated and this many decimals.
+pub(crate) fn with_digits(value: f64, decimals: usize) -> String {
+    let text = format!("{:.decimals$}", value.abs());
+    let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));
+    let whole = count(whole.parse().unwrap_or(0));
+    let sign = if value < 0.0 { "−" } else { "" };
+    if fraction.is_empty() { format!("{sign}{whole}") } else { format!("{sign}{whole}.{fraction}") }
+}
+
 /// A wall time: `0.42 s`, `12.3 s`, `4 min 05 s`, `2 h 03 min`.
 pub fn duration(time: Duration) -> String {
     let seconds = time.as_secs_f64();
@@ -75,6 +104,25 @@ mod tests {
     #[test]
     fn counts() {
         assert_eq!([0, 999, 1000, 1234567].map(count), ["0", "999", "1,000", "1,234,567"]);
+    }
+
+    #[test]
+    fn numbers_have_three_digits() {
+        let cases = [
+            (0.0, "0"),
+            (0.000_012_345, "1.23e-5"),
+            (0.001_234_5, "0.00123"),
+            (0.5, "0.500"),
+            (1.0, "1.00"),
+            (9.996, "10.0"),
+            (45.67, "45.7"),
+            (999.6, "1,000"),
+            (1_234_567.0, "1,234,567"),
+            (-2.5, "−2.50"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(number(value), text);
+        }
     }
 
     #[test]

@@ -110,14 +110,19 @@ fn readable() -> fs::Permissions {
 
 /// Reads a record back.
 pub fn read(path: &Path) -> Result<Report, ReportError> {
+    let bytes = fs::read(path).map_err(|source| ReportError::Read { path: path.to_owned(), source })?;
+    from_bytes(&bytes, path)
+}
+
+/// Reads a record that is in memory; `path` is named in errors.
+pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Report, ReportError> {
     let path_of = || path.to_owned();
-    let bytes = fs::read(path).map_err(|source| ReportError::Read { path: path_of(), source })?;
     let parse = |source| ReportError::Parse { path: path_of(), source };
-    let version: Version = serde_json::from_slice(&bytes).map_err(parse)?;
+    let version: Version = serde_json::from_slice(bytes).map_err(parse)?;
     if version.format > u64::from(FORMAT) {
         return Err(ReportError::Newer { path: path_of(), found: version.format });
     }
-    serde_json::from_slice(&bytes).map_err(parse)
+    serde_json::from_slice(bytes).map_err(parse)
 }
 
 /// What every version of the record has.

@@ -12,7 +12,7 @@ mod table;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use json::{FILE_NAME, ReportError, Written, read, schema, to_json, write};
+pub use json::{FILE_NAME, ReportError, Written, from_bytes, read, schema, to_json, write};
 pub use table::{columns, percent, summary_table};
 
 use crate::compare::SurfaceDistance;
@@ -102,6 +102,43 @@ pub struct SceneRecord {
     pub outputs: Vec<OutputRecord>,
     /// One for each mesh of the file, in its order.
     pub meshes: Vec<MeshRecord>,
+    /// What it takes to load and draw it. Absent where nothing was read, and in records of earlier versions.
+    #[serde(default)]
+    pub costs: Option<SceneCosts>,
+}
+
+/// What it takes to load and draw a scene, beside its triangles.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct SceneCosts {
+    /// Draw calls when every node of the file is seen: primitives of each node's mesh. A node with
+    /// `EXT_mesh_gpu_instancing` draws all its instances at once.
+    pub draw_calls: u64,
+    /// Materials that its meshes use.
+    pub materials: u64,
+    /// Bytes of the written scene and its buffers without the images inside them.
+    pub geometry_bytes: u64,
+    /// One for each entry of `images`.
+    pub images: Vec<ImageRecord>,
+}
+
+/// One image of a scene file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct ImageRecord {
+    /// Its name, else the name of its file.
+    pub name: Option<String>,
+    /// Length of the image file, wherever it is kept.
+    pub bytes: u64,
+    /// In texels; absent for formats that are not known.
+    pub width: Option<u32>,
+    /// In texels; absent for formats that are not known.
+    pub height: Option<u32>,
+}
+
+impl SceneRecord {
+    /// Bytes of all that was written for the scene: file, buffers and images beside it.
+    pub fn file_bytes(&self) -> u64 {
+        self.outputs.iter().map(|output| output.bytes).sum()
+    }
 }
 
 /// One output file.
@@ -124,6 +161,13 @@ pub struct MeshRecord {
     pub name: Option<String>,
     /// Nodes that show it, in any scene of the file.
     pub instances: u64,
+    /// Draw calls of all its nodes.
+    #[serde(default)]
+    pub draw_calls: u64,
+    /// Index of an earlier mesh of the file with the same geometry in bytes of its own: instances that the file does not
+    /// declare.
+    #[serde(default)]
+    pub copy_of: Option<u64>,
     /// Triangles of the source.
     pub triangles: u64,
     /// Vertices of the source.

@@ -42,6 +42,8 @@ fn mesh(hashes: &[u8], instances: u64, levels: &[u64]) -> MeshRecord {
         index: 0,
         name: Some("lamp".into()),
         instances,
+        draw_calls: instances,
+        copy_of: None,
         triangles,
         vertices: 600 * hashes.len() as u64,
         radius: 2.0,
@@ -60,6 +62,7 @@ fn scene(path: &str, status: Status, meshes: Vec<MeshRecord>) -> SceneRecord {
         bytes_out: if status == Status::Baked { 120_000 } else { 0 },
         outputs: vec![],
         meshes,
+        costs: None,
     }
 }
 

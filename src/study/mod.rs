@@ -14,7 +14,6 @@ mod html;
 mod machine;
 mod markdown;
 mod own;
-mod plot;
 pub mod process;
 pub mod record;
 mod resolve;

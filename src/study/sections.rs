@@ -1,10 +1,10 @@
 //! A record as a reader meets it: sections with words, tables and plots. Markdown and the page are two forms of it.
 
 use super::contrast::{Contrast, MEASURES, Needed, common, contrasts, frontier, needed, paired_times, pairs};
-use super::plot::{Plot, Point, Series};
 use super::record::{Cell, Measure, MeshFacts, Record, per_second};
 use super::statistics::{Summary, geometric_mean};
 use super::words::{NONE, mean_and_interval, number, probability};
+use crate::page::plot::{Plot, Point, Series};
 use crate::progress::quantity::count;
 
 /// One part of the report.
@@ -93,6 +93,7 @@ fn against_triangles(record: &Record, quantity: &Quantity) -> Vec<Plot> {
             axes: ["triangles".to_owned(), quantity.label.to_owned()],
             series: series.collect(),
             frontier: Vec::new(),
+            is_even: false,
         }
     };
     let plots = record.meshes.iter().enumerate().map(plot);
@@ -225,6 +226,7 @@ fn looks_against_time(record: &Record) -> (Option<Plot>, Table) {
         axes: ["wall time, relative".to_owned(), "d_RMS, relative".to_owned()],
         series: series.collect(),
         frontier: best.iter().map(|&index| [points[index].0, points[index].1]).collect(),
+        is_even: false,
     };
     ((1 < found.len()).then_some(plot), table)
 }

@@ -4,37 +4,11 @@ use serde_json::Value;
 
 use super::statistics::Summary;
 use crate::config::{SceneSettings, SimplifySettings};
+pub use crate::progress::quantity::number;
+use crate::progress::quantity::{decimals, with_digits};
 
 /// Absent values.
 pub const NONE: &str = "–";
-
-/// Three significant digits, thousands separated: `1.23e-5`, `0.00123`, `1.20`, `45.6`, `1,234`; trailing zeros stay, so
-/// that columns line up.
-pub fn number(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    if value.abs() < 1e-4 {
-        let text = format!("{:.2e}", value.abs());
-        return if value < 0.0 { format!("−{text}") } else { text };
-    }
-    with_digits(value, decimals(value))
-}
-
-/// Decimals that leave three significant digits.
-fn decimals(value: f64) -> usize {
-    // Rounded first, as 9.996 has three digits as 10.0.
-    let rounded: f64 = format!("{:.2e}", value.abs()).parse().unwrap_or(1.0);
-    (2.0 - libm::floor(libm::log10(rounded))).clamp(0.0, 9.0) as usize
-}
-
-fn with_digits(value: f64, decimals: usize) -> String {
-    let text = format!("{:.decimals$}", value.abs());
-    let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));
-    let whole = crate::progress::quantity::count(whole.parse().unwrap_or(0));
-    let sign = if value < 0.0 { "−" } else { "" };
-    if fraction.is_empty() { format!("{sign}{whole}") } else { format!("{sign}{whole}.{fraction}") }
-}
 
 /// `12.3 ± 0.4`: the mean and half the width of its interval, with the digits of the mean.
 pub fn mean_and_interval(summary: &Summary, scale: f64) -> String {
@@ -82,25 +56,6 @@ fn collect(own: &Value, plain: &Value, words: &mut Vec<String>) {
 mod tests {
     use super::*;
     use crate::config::file::SimplifyTable;
-
-    #[test]
-    fn numbers_have_three_digits() {
-        let cases = [
-            (0.0, "0"),
-            (0.000_012_345, "1.23e-5"),
-            (0.001_234_5, "0.00123"),
-            (0.5, "0.500"),
-            (1.0, "1.00"),
-            (9.996, "10.0"),
-            (45.67, "45.7"),
-            (999.6, "1,000"),
-            (1_234_567.0, "1,234,567"),
-            (-2.5, "−2.50"),
-        ];
-        for (value, text) in cases {
-            assert_eq!(number(value), text);
-        }
-    }
 
     #[test]
     fn intervals_have_the_digits_of_the_mean() {

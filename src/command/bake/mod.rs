@@ -7,7 +7,7 @@
 //! A wave is as many changed scenes as fit into a share of memory, so that memory follows the largest scene and not
 //! their number. One bad scene does not stop the others.
 
-mod record;
+pub(super) mod record;
 mod survey;
 mod sweep;
 mod wave;
@@ -34,10 +34,10 @@ use survey::Survey;
 pub struct Bake {
     /// The pipeline file
     #[arg(value_name = "PIPELINE", default_value = "pipeline.toml")]
-    pipeline: PathBuf,
+    pub(super) pipeline: PathBuf,
     /// Tell what would be done, write nothing
     #[arg(long, short = 'n')]
-    dry_run: bool,
+    pub(super) dry_run: bool,
 }
 
 /// What a bake carries from stage to stage.

@@ -1,13 +1,21 @@
 //! What a report says of one scene, made where the scene is baked and remembered by the index.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::wave::ReadScene;
-use crate::gltf::scene::SourceMesh;
+use crate::appearance::images::ImageFacts;
+use crate::gltf::scene::{Scene, SourceMesh};
+use crate::identify::SubMesh;
 use crate::lod::{Chain, ChainLevel};
+use crate::mesh::hash::MeshHash;
 use crate::mesh::{Level, LevelVertices};
 use crate::plan::MeshPlan;
-use crate::report::{LevelRecord, MeshRecord, PieceLevel, PieceRecord, Problem, SceneRecord, Severity, Status};
+use crate::report::{
+    ImageRecord, LevelRecord, MeshRecord, PieceLevel, PieceRecord, Problem, SceneCosts, SceneRecord, Severity, Status,
+};
 use crate::scan::SceneFile;
 use crate::work::{Baked, LevelLook};
 
@@ -19,7 +27,7 @@ pub struct SceneFacts {
 }
 
 /// First byte of remembered facts; another one means another shape of [`SceneFacts`].
-const VERSION: u8 = 2;
+const VERSION: u8 = 3;
 
 /// For the index.
 pub fn to_bytes(facts: &SceneFacts) -> Vec<u8> {
@@ -47,6 +55,7 @@ impl SceneFacts {
             bytes_out: 0,
             outputs: Vec::new(),
             meshes: Vec::new(),
+            costs: None,
         };
         Self { record, problems }
     }
@@ -76,6 +85,7 @@ pub fn warning(scene: &str, place: &str, cause: &str) -> Problem {
 /// The records of all meshes of a scene. `switches` tells screen coverage and distance of the levels of a mesh from its
 /// radius and the levels' errors.
 pub fn meshes(scene: &ReadScene, baked: &Baked, switches: impl Fn(f64, &[f64]) -> Vec<(f64, f64)>) -> Vec<MeshRecord> {
+    let copies = copies(scene);
     let record = |source: &SourceMesh| {
         let radius = scene.radii[source.index];
         let (chain, looks, notes) = match &scene.plans[source.index] {
@@ -88,7 +98,9 @@ pub fn meshes(scene: &ReadScene, baked: &Baked, switches: impl Fn(f64, &[f64]) -
         MeshRecord {
             index: source.index as u64,
             name: source.name.clone(),
-            instances: scene.instances[source.index],
+            instances: scene.uses[source.index].instances,
+            draw_calls: (scene.uses[source.index].nodes * source.primitives.len()) as u64,
+            copy_of: copies[source.index],
             triangles: source.triangles() as u64,
             vertices: source.triangle_primitives().map(|(_, p)| p.count as u64).sum(),
             radius,
@@ -103,6 +115,45 @@ pub fn meshes(scene: &ReadScene, baked: &Baked, switches: impl Fn(f64, &[f64]) -
         }
     };
     scene.scene.meshes.iter().map(record).collect()
+}
+
+/// For each mesh, an earlier one with the same geometry that is kept in other bytes. Meshes that differ by their
+/// materials alone share accessors, and so they are no copies.
+fn copies(scene: &ReadScene) -> Vec<Option<u64>> {
+    let document = scene.scene.document.array("meshes").unwrap_or_default();
+    let accessors = |index: usize| -> Vec<(&Value, &Value)> {
+        let primitives = document[index].get("primitives").and_then(Value::as_array);
+        primitives.into_iter().flatten().map(|p| (&p["attributes"], &p["indices"])).collect()
+    };
+    let mut first: BTreeMap<Vec<MeshHash>, usize> = BTreeMap::new();
+    let copy = |(index, subs): (usize, &Vec<SubMesh>)| {
+        let hashes: Vec<MeshHash> = subs.iter().map(|sub| sub.hash).collect();
+        if hashes.is_empty() {
+            return None;
+        }
+        let earlier = *first.entry(hashes).or_insert(index);
+        (earlier != index && accessors(earlier) != accessors(index)).then_some(earlier as u64)
+    };
+    scene.sub_meshes.iter().enumerate().map(copy).collect()
+}
+
+/// What it takes to load and draw a scene; its bytes are known once it is written.
+pub fn costs(scene: &Scene, meshes: &[MeshRecord], images: &[ImageFacts]) -> SceneCosts {
+    let document = scene.document.array("meshes").unwrap_or_default();
+    let primitives = document.iter().filter_map(|mesh| mesh.get("primitives")?.as_array()).flatten();
+    let materials: BTreeSet<Option<u64>> = primitives.map(|p| p.get("material").and_then(Value::as_u64)).collect();
+    let image = |facts: &ImageFacts| ImageRecord {
+        name: facts.name.clone(),
+        bytes: facts.bytes,
+        width: facts.size.map(|size| size[0]),
+        height: facts.size.map(|size| size[1]),
+    };
+    SceneCosts {
+        draw_calls: meshes.iter().map(|mesh| mesh.draw_calls).sum(),
+        materials: materials.len() as u64,
+        geometry_bytes: 0,
+        images: images.iter().map(image).collect(),
+    }
 }
 
 fn pieces(scene: &ReadScene, source: &SourceMesh, chain: Option<&Chain>) -> Vec<PieceRecord> {

@@ -11,6 +11,7 @@ use super::record::{self, SceneFacts};
 use super::survey::Todo;
 use crate::appearance::assemble;
 use crate::appearance::fingerprint::Fingerprints;
+use crate::appearance::images::{ImageFacts, image_facts};
 use crate::appearance::looks::Looks;
 use crate::cache::{Bucket, Cache, Lookup};
 use crate::config::Format;
@@ -21,7 +22,7 @@ use crate::gltf::instancing;
 use crate::gltf::lod::{MeshLevel, MeshLevels, PrimitiveLevel, WriteError, add_levels, is_sealed, switches};
 use crate::gltf::package::Package;
 use crate::gltf::scene::{Scene, SourceMesh};
-use crate::identify::instances::mesh_uses;
+use crate::identify::instances::{MeshUse, mesh_uses};
 use crate::identify::{SubMesh, materials, sub_meshes};
 use crate::index::{self, Seen};
 use crate::key::JobKey;
@@ -62,7 +63,8 @@ pub struct ReadScene {
     /// By mesh.
     pub sub_meshes: Vec<Vec<SubMesh>>,
     /// By mesh: nodes that show it.
-    pub instances: Vec<u64>,
+    pub uses: Vec<MeshUse>,
+    images: Vec<ImageFacts>,
     /// By mesh: radius of its bounding sphere.
     pub radii: Vec<f64>,
     /// By mesh, where looks are measured.
@@ -281,7 +283,8 @@ fn read_scene(todo: Todo) -> Result<ReadScene, Failure> {
         .sum();
     Ok(ReadScene {
         looks: mesh_looks(&scene, &sub_meshes, &beside, &todo),
-        instances: uses.iter().map(|used| used.instances).collect(),
+        images: image_facts(&scene.document, &scene.buffers, base),
+        uses,
         radii: scene.meshes.iter().map(radius).collect(),
         plans: Vec::new(),
         bytes: bytes.len() as u64 + buffers,
@@ -348,7 +351,10 @@ fn write_scene(scene: ReadScene, baked: &Baked, output: &OutputFolder, root: &Pa
         bytes_out: 0,
         outputs: Vec::new(),
         meshes: record::meshes(&scene, baked, |radius, errors| switches(radius, errors, settings)),
+        costs: None,
     };
+    let mut costs = record::costs(&scene.scene, &record.meshes, &scene.images);
+    let embedded: u64 = scene.images.iter().map(|image| image.embedded).sum();
     let target = target(root, &relative, settings.format);
     let stem = target.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let container = match settings.format {
@@ -405,6 +411,8 @@ fn write_scene(scene: ReadScene, baked: &Baked, output: &OutputFolder, root: &Pa
         .map(|o| OutputRecord { path: o.relative.clone(), bytes: o.seen.stat.size, hash: o.seen.content.to_string() })
         .collect();
     record.bytes_out = record.outputs.iter().filter(|o| is_geometry(&o.path)).map(|o| o.bytes).sum();
+    costs.geometry_bytes = record.bytes_out.saturating_sub(embedded);
+    record.costs = Some(costs);
     let bake =
         index::Bake { scene: seen, dependencies: scene_dependencies, meshes: hashes, outputs, facts: Vec::new() };
     let new_files = emitted.files.iter().filter(|f| f.written).count() as u64;

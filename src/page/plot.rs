@@ -1,11 +1,12 @@
-//! Plots as SVG text: points and lines over two logarithmic axes.
+//! Plots as SVG text: points and lines over two axes, logarithmic unless said otherwise.
 //!
 //! Colours are classes of the page's style sheet, so that one SVG is right in light and in dark; that is what the
 //! plotting crates cannot do, which write colours into every element. Knows nothing of studies.
 
 use std::fmt::Write as _;
 
-use super::html::escape;
+use super::escape;
+use crate::progress::quantity::number;
 
 /// One plot.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -18,6 +19,8 @@ pub struct Plot {
     pub series: Vec<Series>,
     /// Points of a line below everything: from left to right.
     pub frontier: Vec<[f64; 2]>,
+    /// The horizontal axis counts evenly: for runs, not for sizes.
+    pub is_even: bool,
 }
 
 /// Points that belong together.
@@ -58,6 +61,8 @@ struct Axis {
     high: f64,
     /// Pixels of `low` and `high`.
     span: [f64; 2],
+    /// Not logarithmic: `low` and `high` are values.
+    is_even: bool,
 }
 
 impl Axis {
@@ -70,21 +75,38 @@ impl Axis {
         }
         // At least a third of a decade, so that noise is not blown up to fill the plot.
         let room = (0.06 * (high - low)).max(0.5 * (1.0 / 3.0 - (high - low))).max(0.02);
-        Some(Self { low: low - room, high: high + room, span })
+        Some(Self { low: low - room, high: high + room, span, is_even: false })
+    }
+
+    /// Counts evenly, over whole numbers.
+    fn even(values: impl Iterator<Item = f64>, span: [f64; 2]) -> Option<Self> {
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        (low <= high).then_some(Self { low: low - 0.5, high: high + 0.5, span, is_even: true })
+    }
+
+    fn scaled(&self, value: f64) -> f64 {
+        if self.is_even { value } else { libm::log10(value) }
     }
 
     fn at(&self, value: f64) -> f64 {
-        let share = (libm::log10(value) - self.low) / (self.high - self.low);
+        let share = (self.scaled(value) - self.low) / (self.high - self.low);
         self.span[0] + share * (self.span[1] - self.span[0])
     }
 
     fn holds(&self, value: f64) -> bool {
-        let log = libm::log10(value);
-        self.low <= log && log <= self.high
+        let at = self.scaled(value);
+        self.low <= at && at <= self.high
     }
 
     /// Round values, 3 to 8 of them where the range allows: decades, or 1-2-5 steps, or finer.
     fn ticks(&self) -> Vec<f64> {
+        if self.is_even {
+            let step = libm::ceil((self.high - self.low) / 8.0).max(1.0) as usize;
+            return (libm::ceil(self.low) as i64..=libm::floor(self.high) as i64)
+                .step_by(step)
+                .map(|t| t as f64)
+                .collect();
+        }
         let decades =
             (libm::floor(self.low) as i32..=libm::ceil(self.high) as i32).map(|e| libm::pow(10.0, f64::from(e)));
         let decades: Vec<f64> = decades.collect();
@@ -129,7 +151,9 @@ impl Plot {
         let [left, top, right, bottom] = MARGINS;
         let points = || self.series.iter().flat_map(|series| &series.points);
         let ys = points().flat_map(|p| std::iter::once(p.at[1]).chain(p.ends.into_iter().flatten()));
-        let x = Axis::new(points().map(|p| p.at[0]), [left, WIDTH - right]);
+        let xs = points().map(|p| p.at[0]);
+        let span = [left, WIDTH - right];
+        let x = if self.is_even { Axis::even(xs, span) } else { Axis::new(xs, span) };
         let y = Axis::new(ys, [HEIGHT - bottom, top]);
         let (Some(x), Some(y)) = (x, y) else { return String::new() };
         let mut svg = String::new();
@@ -246,12 +270,7 @@ impl Series {
                     ),
                 );
             }
-            let title = escape(&format!(
-                "{}: {} at {}",
-                self.name,
-                super::words::number(point.at[1]),
-                super::words::number(point.at[0])
-            ));
+            let title = escape(&format!("{}: {} at {}", self.name, number(point.at[1]), number(point.at[0])));
             put(
                 svg,
                 format_args!(
