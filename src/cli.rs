@@ -9,7 +9,8 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::command::failure::{Failure, UsageError};
 use crate::command::{
-    CacheChoice, Context, Exit, bake, cache, check, completions, diff, evaluate, explain, init, inspect, schema, study,
+    CacheChoice, Context, Exit, bake, cache, check, completions, diff, evaluate, explain, init, inspect, report,
+    schema, study,
 };
 use crate::progress::{JsonLines, Lines, Paint, Reporter, Terminal, Verbosity};
 
@@ -86,6 +87,8 @@ enum Command {
     Check(check::Check),
     /// Tell what changed between two reports or revisions
     Diff(diff::Diff),
+    /// Write what was recorded for comments, CI services, trackers, or as a page
+    Report(report::ReportCommand),
     /// Write a commented pipeline to start from
     Init(init::Init),
     /// Show what is in a scene, and what a bake would save
@@ -125,6 +128,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> Exit {
         Command::Bake(command) => command.run(&context),
         Command::Check(command) => command.run(&context),
         Command::Diff(command) => command.run(&context),
+        Command::Report(command) => command.run(&context),
         Command::Init(command) => command.run(&context),
         Command::Evaluate(command) => command.run(&context),
         Command::Explain(command) => command.run(&context),

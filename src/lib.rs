@@ -36,6 +36,7 @@ pub mod budget;
 pub mod difference;
 pub mod evaluation;
 pub mod page;
+pub mod publish;
 pub mod study;
 pub mod command;
 pub mod cli;

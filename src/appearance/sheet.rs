@@ -4,6 +4,7 @@ use super::drawable::Drawable;
 use super::render::{Picture, Render, RenderError, Shot, pictures};
 use super::views::{Camera, Frame};
 use glam::DVec3;
+use image::RgbImage;
 use std::io::Cursor;
 
 /// How much differences are stretched.
@@ -22,6 +23,18 @@ pub fn sheet(
     directions: &[DVec3],
     size: u32,
 ) -> Result<Vec<u8>, RenderError> {
+    Ok(png(&draw(renderer, source, levels, frame, directions, size)?))
+}
+
+/// The same as a picture.
+pub fn draw(
+    renderer: &dyn Render,
+    source: &Drawable,
+    levels: &[&Drawable],
+    frame: Frame,
+    directions: &[DVec3],
+    size: u32,
+) -> Result<RgbImage, RenderError> {
     let cameras = Camera::all(frame, directions);
     let shot = Shot { size, faces: false };
     let source = pictures(renderer, source, &cameras, shot)?;
@@ -29,7 +42,7 @@ pub fn sheet(
     let levels = levels?;
     let columns = 1 + 2 * levels.len() as u32;
     let pitch = size + GAP;
-    let mut image = image::RgbImage::from_pixel(
+    let mut image = RgbImage::from_pixel(
         columns * pitch - GAP,
         (directions.len() as u32 * pitch).saturating_sub(GAP).max(1),
         image::Rgb([255; 3]),
@@ -44,10 +57,10 @@ pub fn sheet(
             put(2 + 2 * i, &stretched(picture, &level[row]));
         }
     }
-    Ok(png(&image))
+    Ok(image)
 }
 
-fn paste(image: &mut image::RgbImage, picture: &Picture, left: u32, top: u32) {
+fn paste(image: &mut RgbImage, picture: &Picture, left: u32, top: u32) {
     for (i, [r, g, b, _]) in picture.pixels.iter().enumerate() {
         let (x, y) = (i as u32 % picture.size, i as u32 / picture.size);
         image.put_pixel(left + x, top + y, image::Rgb([*r, *g, *b]));
@@ -61,7 +74,15 @@ fn stretched(a: &Picture, b: &Picture) -> Picture {
     Picture { size: a.size, pixels: pixels.collect(), faces: Vec::new() }
 }
 
-fn png(image: &image::RgbImage) -> Vec<u8> {
+/// A small file for pages: a sheet is for looking, figures come from elsewhere.
+pub fn jpeg(image: &RgbImage) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 85);
+    image.write_with_encoder(encoder).expect("an image in memory can be written");
+    bytes
+}
+
+fn png(image: &RgbImage) -> Vec<u8> {
     let mut bytes = Vec::new();
     image.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png).expect("an image in memory can be written");
     bytes

@@ -176,6 +176,11 @@ impl Check {
                 Err(unknown) => checked.unknown.push(unknown),
             }
         }
+        if files.is_empty() {
+            let is_there = |path: &str| found.files.iter().any(|file| file.relative == path);
+            let gone = base.values().filter(|scene| scene.status != crate::report::Status::Skipped);
+            checked.findings.extend(gone.filter(|scene| !is_there(&scene.path)).map(|scene| vanished(&scene.path)));
+        }
         budget::sort(&mut checked.findings);
         Ok(checked)
     }
@@ -202,6 +207,24 @@ impl Check {
                 Ok(None)
             }
         }
+    }
+}
+
+/// A scene of the baseline that is not there any more: told, and no reason to stop a commit.
+fn vanished(path: &str) -> Finding {
+    Finding {
+        severity: Severity::Warning,
+        rule: "regression/vanished".to_owned(),
+        scene: Some(path.to_owned()),
+        mesh: None,
+        level: None,
+        value: None,
+        base: None,
+        limit: None,
+        message: "the scene is in the baseline and not there any more".to_owned(),
+        help: "if it was meant: take a new baseline".to_owned(),
+        line: None,
+        excess: f64::MAX,
     }
 }
 

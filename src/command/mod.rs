@@ -14,6 +14,7 @@ pub mod failure;
 pub mod init;
 pub mod inspect;
 mod recorded;
+pub mod report;
 pub mod schema;
 pub mod study;
 

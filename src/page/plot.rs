@@ -32,6 +32,8 @@ pub struct Series {
     pub color: usize,
     /// Its line is dashed.
     pub is_dashed: bool,
+    /// Its points are of unlike things: no line joins them.
+    pub is_scattered: bool,
     /// From left to right.
     pub points: Vec<Point>,
 }
@@ -253,7 +255,7 @@ impl Series {
             self.points.iter().filter(|p| p.at.iter().all(|v| 0.0 < *v && v.is_finite())).collect();
         let color = self.color % COLORS;
         put(svg, format_args!("<g class=\"c{color}\">"));
-        if 1 < points.len() {
+        if 1 < points.len() && !self.is_scattered {
             let places: Vec<String> = points.iter().map(|p| place(x, y, p.at)).collect();
             let dashed = if self.is_dashed { " dashed" } else { "" };
             put(svg, format_args!("<polyline class=\"line{dashed}\" points=\"{}\"/>", places.join(" ")));

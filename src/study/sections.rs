@@ -103,7 +103,7 @@ fn against_triangles(record: &Record, quantity: &Quantity) -> Vec<Plot> {
 fn series_of(record: &Record, algorithm: usize, points: Vec<Point>) -> Series {
     let facts = &record.algorithms[algorithm];
     let color = unmatched(record).take_while(|&other| other != algorithm).count();
-    Series { name: facts.name.clone(), color, is_dashed: !facts.is_own, points }
+    Series { name: facts.name.clone(), color, is_dashed: !facts.is_own, is_scattered: false, points }
 }
 
 /// A table for each mesh: a row for each algorithm, a column for each target.

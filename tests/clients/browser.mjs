@@ -51,12 +51,17 @@ async function bundle(engines, folder) {
   await stop(); // its helper process would keep half a gigabyte
 }
 
+/** Headless Chromium with software GL. */
+export function launch() {
+  return chromium.launch({ executablePath: chromiumPath(), headless: true, chromiumSandbox: false, args: FLAGS, timeout: START_LIMIT_MS });
+}
+
 /** A server and a browser with the pages of `engines` ready to open. Call `close` at the end. */
 export async function open(engines) {
   const folder = await mkdtemp(path.join(tmpdir(), 'lodbake-clients-'));
   await bundle(engines, folder);
   const server = await serve(folder);
-  const browser = await chromium.launch({ executablePath: chromiumPath(), headless: true, chromiumSandbox: false, args: FLAGS, timeout: START_LIMIT_MS });
+  const browser = await launch();
   const modules = path.join(HERE, 'node_modules');
   const urls = {
     draco: `${server.url(path.join(modules, 'three/examples/jsm/libs/draco/gltf'))}/`,

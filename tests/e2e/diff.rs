@@ -43,7 +43,11 @@ fn planted_regressions_are_told_first() {
     let first: Vec<&str> = run.stdout.lines().take(2).collect();
     assert_eq!(first[0], "! vanished c.glb: the scene is not there any more");
     assert!(first[1].starts_with("! uglier a.glb: mesh `shape`, level "), "{}", first[1]);
-    assert!(run.stdout.contains("\n! uglier a.glb: mesh `shape`, level 1: image difference (d_RMS) "), "{}", run.stdout);
+    assert!(
+        run.stdout.contains("\n! uglier a.glb: mesh `shape`, level 1: image difference (d_RMS) "),
+        "{}",
+        run.stdout
+    );
     assert!(run.stdout.contains("\n! grew b.glb: bytes of the files +"), "{}", run.stdout);
     assert!(run.stdout.contains("\n  shrank a.glb: mesh `shape`, level 1: triangles −"), "{}", run.stdout);
 
