@@ -17,7 +17,8 @@ pub fn annotations(publication: &Publication<'_>) -> String {
     let shown = |severity| (publication.count(severity) as usize).min(MOST);
     let hidden = publication.findings.len() - shown(Severity::Error) - shown(Severity::Warning);
     if 0 < hidden {
-        text.push_str(&format!("::notice title=lodbake::and {hidden} more findings: they are in the summary\n"));
+        let hidden = hidden.to_string();
+        text.extend(["::notice title=lodbake::and ", &hidden, " more findings: they are in the summary\n"]);
     }
     text
 }

@@ -74,12 +74,13 @@ pub fn html(publication: &Publication<'_>, extras: &Extras<'_>) -> String {
         ("assets", "Assets", assets(publication, extras)),
     ];
     let shown = || parts.iter().filter(|(_, _, text)| !text.is_empty());
-    let links: String = shown().map(|(id, title, _)| format!("<a href=\"#{id}\">{title}</a>")).collect();
-    let sections: String = shown()
-        .map(|(id, title, text)| {
-            format!("<section id=\"{id}\" aria-labelledby=\"{id}-title\">\n<h2 id=\"{id}-title\">{title}</h2>\n{text}</section>\n")
-        })
-        .collect();
+    let link = |(id, title, _): &(&str, &str, String)| format!("<a href=\"#{id}\">{title}</a>");
+    let links: String = shown().map(link).collect();
+    let section = |(id, title, text): &(&str, &str, String)| {
+        let heading = format!("<h2 id=\"{id}-title\">{title}</h2>");
+        format!("<section id=\"{id}\" aria-labelledby=\"{id}-title\">\n{heading}\n{text}</section>\n")
+    };
+    let sections: String = shown().map(section).collect();
     let viewer =
         extras.viewer.map(|program| format!("<script>\n{}\n</script>\n", harmless(program))).unwrap_or_default();
     let body = format!(

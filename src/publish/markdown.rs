@@ -49,7 +49,7 @@ fn table(head: &str, rows: impl ExactSizeIterator<Item = String>, room: usize) -
     let all = rows.len();
     for (number, row) in rows.enumerate() {
         if room < text.len() + row.len() + 60 {
-            text.push_str(&format!("\n… and {} more.\n", count((all - number) as u64)));
+            text.extend(["\n… and ", &count((all - number) as u64), " more.\n"]);
             return text;
         }
         text.push_str(&row);

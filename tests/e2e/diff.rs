@@ -56,7 +56,9 @@ fn planted_regressions_are_told_first() {
     let run = space.run(&[&lenient[..], &["--max-sum-growth", "0"]].concat());
     assert_eq!(run.code, 0, "in sum it became less: {}", run.stdout);
     let document = space.run(&["diff", "--json", "out", "base.json", "--max-sum-growth", "1"]).document();
-    assert_eq!(document["changes"][0]["scene"], serde_json::Value::Null, "{document:#}");
+    let changes = document["changes"].as_array().expect("a list");
+    let sums: Vec<_> = changes.iter().filter(|change| change["scene"].is_null()).collect();
+    assert!(!sums.is_empty() && sums.iter().all(|sum| sum["kind"] == "grew"), "{document:#}");
     let validator = jsonschema::validator_for(&space.run_fine(&["schema", "diff"]).document()).expect("a schema");
     assert!(validator.is_valid(&document));
 }

@@ -31,12 +31,7 @@ const LEVELS: u64 = 4;
 const MODEL: u64 = 20_000_000;
 
 /// Draws and packs scenes that were written to `folder`.
-pub fn make(
-    scenes: &[&SceneRecord],
-    folder: &Path,
-    with_models: bool,
-    context: &Context,
-) -> anyhow::Result<Vec<Asset>> {
+pub fn make(scenes: &[&SceneRecord], folder: &Path, with_models: bool, context: &Context) -> Vec<Asset> {
     let told = std::sync::atomic::AtomicUsize::new(0);
     let made = scenes.par_iter().map(|scene| {
         let asset = asset(scene, folder, with_models);
@@ -46,7 +41,7 @@ pub fn make(
         }
         asset
     });
-    Ok(made.collect())
+    made.collect()
 }
 
 /// The written scene file, if it is there.

@@ -127,7 +127,9 @@ impl ReportCommand {
         };
         let jobs = context.jobs.map_or(0, std::num::NonZeroUsize::get);
         let threads = rayon::ThreadPoolBuilder::new().num_threads(jobs).build().context("failed to start threads")?;
-        let known = self.read(context)?;
+        // The record alone, as for a first baseline, needs nothing to be compared with.
+        let is_compared = targets.iter().any(|(_, format)| *format != Format::Json);
+        let known = self.read(context, is_compared)?;
         for (path, format) in targets {
             let text = threads.install(|| self.text(&known, format, context))?;
             match path {
@@ -141,7 +143,7 @@ impl ReportCommand {
         Ok(Exit::Fine)
     }
 
-    fn read(&self, context: &Context) -> anyhow::Result<Known> {
+    fn read(&self, context: &Context, is_compared: bool) -> anyhow::Result<Known> {
         let is_pipeline = |word: &String| Path::new(word).extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
         let (file, words) = match self.words.split_first() {
             Some((first, rest)) if is_pipeline(first) => (Path::new(first), rest),
@@ -167,7 +169,7 @@ impl ReportCommand {
                 (report, outputs)
             }
         };
-        let base = self.base(pipeline.as_ref(), context)?;
+        let base = if is_compared { self.base(pipeline.as_ref(), context)? } else { None };
         let difference = base.as_ref().map(|base| Difference::between(base, &report, &self.limits.thresholds()));
         let findings = findings(&report, pipeline.as_ref(), base.as_ref(), difference.as_ref());
         Ok(Known { pipeline, report, history: reports, outputs, difference, findings })
@@ -212,7 +214,7 @@ impl ReportCommand {
                 let wanted: Vec<&SceneRecord> =
                     publish::by_severity(&publication).into_iter().take(self.sheets).collect();
                 let made = match &known.outputs {
-                    Some(folder) => assets::make(&wanted, folder, self.viewer, context)?,
+                    Some(folder) => assets::make(&wanted, folder, self.viewer, context),
                     None => Vec::new(),
                 };
                 let viewer = self.viewer.then_some(assets::VIEWER);
