@@ -13,7 +13,7 @@ use super::bake::{self, record};
 use super::failure::UsageError;
 use super::{CacheChoice, Context, Exit, recorded};
 use crate::budget::{self, Finding};
-use crate::config::Pipeline;
+use crate::config::{Pipeline, SceneSettings};
 use crate::index::{Index, Reason, SettingsKey, Status};
 use crate::progress::quantity::{count, duration, plural};
 use crate::report::{Report, SceneRecord, Severity};
@@ -39,6 +39,9 @@ The facts are those that the last bake recorded: a scene that has changed since,
 and is named. Files that are no part of the pipeline are passed over, so that hooks can name whatever has changed.
 
 Exit codes: 1 if a limit `error` is exceeded; 3 if some scene could not be judged; 0 with warnings alone.";
+
+/// Scenes that are judged by one thread: a scene takes some microseconds, a thread's start more.
+const ONE_THREAD: usize = 100;
 
 /// Findings that are told without `--verbose`: the worst.
 const SHOWN: usize = 40;
@@ -147,23 +150,31 @@ impl Check {
             .filter(|file| limited(file))
             .collect();
         // Settings are the same for most scenes: their key is made once for each kind.
-        let mut keys: BTreeMap<Vec<u8>, SettingsKey> = BTreeMap::new();
+        let mut kinds: Vec<(SceneSettings, SettingsKey)> = Vec::new();
         let mut tasks = Vec::new();
         for file in scenes {
             let settings = pipeline.settings_for(&file.relative);
             if settings.skip {
                 continue;
             }
-            let min_triangles = settings.min_triangles as u64;
-            let text = serde_json::to_vec(&settings)?;
-            tasks.push((file, keys.entry(text).or_insert_with(|| SettingsKey::of(settings)).clone(), min_triangles));
+            let known = kinds.iter().position(|(other, _)| *other == settings);
+            let kind = known.unwrap_or_else(|| {
+                kinds.push((settings.clone(), SettingsKey::of(settings)));
+                kinds.len() - 1
+            });
+            tasks.push((file, kind));
+        }
+        if files.is_empty() {
+            index.load_facts();
         }
         let judged: Vec<Result<Vec<Finding>, Unknown>> = tasks
             .par_iter()
-            .map(|(file, key, min_triangles)| {
+            .with_min_len(ONE_THREAD)
+            .map(|&(file, kind)| {
+                let (settings, key) = &kinds[kind];
                 let scene = record_of(&index, file, key)?;
                 let base = base.get(file.relative.as_str()).copied();
-                Ok(budget::check(&scene, &pipeline.budgets, *min_triangles, base))
+                Ok(budget::check(&scene, &pipeline.budgets, settings.min_triangles as u64, base))
             })
             .collect();
         let mut checked = Checked { scenes: 0, unknown: Vec::new(), findings: Vec::new(), notes };
@@ -293,9 +304,14 @@ impl Checked {
             lines.push(format!("and {} more: `--verbose` lists all", count((self.findings.len() - shown) as u64)));
         }
         let hint = "`lodbake` bakes them, `lodbake check --bake-missing` bakes and checks";
-        for (i, unknown) in self.unknown.iter().enumerate() {
-            let is_last = i + 1 == self.unknown.len();
+        let told = self.unknown.len().min(shown);
+        for (i, unknown) in self.unknown.iter().take(told).enumerate() {
+            let is_last = i + 1 == told;
             lines.push(paint.error_lines(&format!("{}: {}", unknown.scene, unknown.reason), is_last.then_some(hint)));
+        }
+        if told < self.unknown.len() {
+            let more = count((self.unknown.len() - told) as u64);
+            lines.push(format!("and {more} more that cannot be judged: `--verbose` lists all"));
         }
         lines.extend(self.notes.iter().map(|note| paint.warning_lines(note, None)));
         lines.into_iter().map(|line| line + "\n").collect()

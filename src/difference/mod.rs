@@ -342,7 +342,7 @@ impl Change {
         }
     }
 
-    /// What changed, without the place: `level 2 …` is in [`budget::Finding::place`].
+    /// What changed, without the place: `level 2 …` is in [`Finding::place`].
     pub fn message(&self) -> String {
         words::message(self)
     }

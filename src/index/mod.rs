@@ -189,6 +189,13 @@ impl Index {
         self.stored_facts.as_ref()?.read(&self.entries.get(relative)?.facts)
     }
 
+    /// Reads the facts of all scenes at once, for those who will ask for most of them.
+    pub fn load_facts(&self) {
+        if let Some(stored) = &self.stored_facts {
+            stored.load();
+        }
+    }
+
     /// Looks at file facts only. Call it before the scene is read: it notes the time of the run's first reading.
     pub fn status(&self, scene: &SceneFile, settings: &SettingsKey) -> Status<'_> {
         let status = self.look(scene, settings, true);

@@ -67,12 +67,38 @@ pub(super) struct StoredFacts {
     file: Mutex<File>,
     start: u64,
     size: u64,
+    /// All of them, where many are asked for.
+    loaded: OnceLock<Vec<u8>>,
 }
 
 impl StoredFacts {
+    fn new(file: File, start: u64, size: u64) -> Self {
+        Self { file: Mutex::new(file), start, size, loaded: OnceLock::new() }
+    }
+
+    /// Reads all of them at once: many single reads would wait for each other.
+    pub fn load(&self) {
+        let read = || {
+            let mut all = vec![0; usize::try_from(self.size).ok()?];
+            let mut file = self.file.lock().ok()?;
+            file.seek(SeekFrom::Start(self.start)).ok()?;
+            file.read_exact(&mut all).ok()?;
+            Some(all)
+        };
+        if self.loaded.get().is_none()
+            && let Some(all) = read()
+        {
+            self.loaded.get_or_init(|| all);
+        }
+    }
+
     /// `None` if they are not as they were written.
     pub fn read(&self, at: &FactsAt) -> Option<Vec<u8>> {
         at.offset.checked_add(at.size).filter(|&end| end <= self.size)?;
+        if let Some(all) = self.loaded.get() {
+            let facts = &all[usize::try_from(at.offset).ok()?..usize::try_from(at.offset + at.size).ok()?];
+            return (blake3::hash(facts).as_bytes() == &at.content.0).then(|| facts.to_vec());
+        }
         let mut facts = vec![0; usize::try_from(at.size).ok()?];
         let mut file = self.file.lock().ok()?;
         file.seek(SeekFrom::Start(self.start + at.offset)).ok()?;
@@ -122,7 +148,7 @@ impl Index {
             .and_then(|()| File::open(&self.file))
             .map(|file| {
                 let (start, size) = ((HEADER + records.len()) as u64, facts.len() as u64);
-                self.stored_facts = Some(StoredFacts { file: Mutex::new(file), start, size });
+                self.stored_facts = Some(StoredFacts::new(file, start, size));
                 self.is_changed = false;
             })
             .map_err(|source| IndexError { file: self.file.display().to_string(), source })
@@ -188,7 +214,7 @@ fn read(path: &Path) -> Result<Option<(Records, StoredFacts)>, String> {
         return Err("it is damaged".to_owned());
     }
     let records = postcard::from_bytes(&records).map_err(|error| error.to_string())?;
-    let facts = StoredFacts { file: Mutex::new(file), start: HEADER as u64 + records_size, size: facts_size };
+    let facts = StoredFacts::new(file, HEADER as u64 + records_size, facts_size);
     Ok(Some((records, facts)))
 }
 

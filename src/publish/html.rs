@@ -331,7 +331,9 @@ fn level_row(scene: &SceneRecord, mesh: &MeshRecord, name: &str, level: u64, fin
     };
     let triangles = fact(Fact::Triangles);
     let share = triangles.filter(|_| 0 < mesh.triangles).map(|t| t / mesh.triangles as f64);
-    let own = || findings.iter().filter(|f| f.mesh.is_none() || f.level.is_none_or(|l| l == level));
+    // What is about the whole scene stands at its sources.
+    let is_own = |f: &&&&Finding| if f.mesh.is_none() { level == 0 } else { f.level.is_none_or(|l| l == level) };
+    let own = || findings.iter().filter(is_own);
     let state = if own().any(|f| f.severity == Severity::Error) {
         "error"
     } else if own().any(|_| true) {

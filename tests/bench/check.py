@@ -10,6 +10,7 @@ import argparse
 import json
 import os
 import pathlib
+import resource
 import statistics
 import struct
 import subprocess
@@ -74,11 +75,14 @@ def make(folder, files):
 
 
 def timed(words, folder):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     start = time.perf_counter()
     done = subprocess.run(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     seconds = time.perf_counter() - start
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     assert done.returncode == 0, f"{words}: exit code {done.returncode}\n{done.stdout[-2000:]}"
-    return seconds, done.stdout
+    return seconds, cpu, done.stdout
 
 
 def main():
@@ -101,19 +105,25 @@ def main():
             timed([lodbake, "-q"], folder)
         commands = {"git status": ["git", "status", "--short"], "lodbake check": [lodbake, "check"]}
         times = {name: [] for name in commands}
+        cpus = {name: [] for name in commands}
         for words in commands.values():
-            said = timed(words, folder)[1]
+            said = timed(words, folder)[2]
             print("  ".join(words[-2:]), "|", (said.strip().splitlines() or ["(clean)"])[-1])
         for _ in range(arguments.rounds):
             for name, words in commands.items():
-                times[name].append(timed(words, folder)[0])
+                seconds, cpu, _ = timed(words, folder)
+                times[name].append(seconds)
+                cpus[name].append(cpu)
         for name, all_times in times.items():
-            print(f"{name:14} median {1000 * statistics.median(all_times):7.1f} ms   fastest {1000 * min(all_times):7.1f} ms")
+            median, cpu = 1000 * statistics.median(all_times), 1000 * statistics.median(cpus[name])
+            print(f"{name:14} median {median:7.1f} ms   fastest {1000 * min(all_times):7.1f} ms   processor {cpu:7.1f} ms")
         ratios = [b / a for a, b in zip(*times.values())]
         medians = [statistics.median(all_times) for all_times in times.values()]
         low, high = statistics.quantiles(ratios, n=4)[::2]
         print(f"ratio of the medians {medians[1] / medians[0]:.2f} (middle half of {arguments.rounds} rounds: {low:.2f} to {high:.2f}), "
-              f"{arguments.files} files, {os.cpu_count()} processors")
+              f"{arguments.files} files, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}")
+        cpu = [statistics.median(all_cpus) for all_cpus in cpus.values()]
+        print(f"ratio of processor time {cpu[1] / cpu[0]:.2f}")
 
 
 if __name__ == "__main__":
