@@ -68,7 +68,37 @@ fn some() -> Vec<Finding> {
 
 #[test]
 fn markdown_names_the_worst_first() {
-    insta::assert_snapshot!(with(&record(), &some(), |p| markdown(p, 64_000)), @"");
+    insta::assert_snapshot!(with(&record(), &some(), |p| markdown(p, 64_000)), @r"
+    <!-- lodbake report -->
+    ## lodbake: 2 errors, 1 warning
+
+    3 scenes baked, 0 of 0 meshes distinct, 60.0 kB written (lodbake 0.1.0).
+
+    | | where | what | what would help |
+    |---|---|---|---|
+    | **error** | gone.glb: mesh `shade`, level 1 | gone | ask for `ratio = 0.4` |
+    | **error** | lamp.glb: mesh `shade`, level 1 | 5 triangles; limit 4 \| 25 % over | ask for `ratio = 0.4` |
+    | warning | a b,c.glb | meshes\[0\]: &lt;odd&gt; &amp; 100% of it |  |
+
+    ### Since the baseline
+
+    In sum: bytes of the files: 70.0 kB → 60.0 kB (−14 %); bytes of geometry: 60.0 kB → 45.0 kB (−25 %); bytes of textures: 20.0 kB → 15.0 kB (−25 %); triangles of the scene, with every instance: 24,000 → 18,000 (−25 %); draw calls: 48 → 36 (−25 %).
+
+    | | where | what |
+    |---|---|---|
+    | **vanished** | zzz.glb | the scene is not there any more |
+    | **grew** | lamp.glb | bytes of the files 2.0 times as much: 10.0 kB → 20.0 kB |
+
+    <details><summary>All 3 scenes</summary>
+
+    | scene | state | triangles | levels | worst d_RMS | bytes |
+    |---|---|--:|--:|--:|--:|
+    | lamp.glb | baked | 6,000 | 2 | 6.00 | 20.0 kB |
+    | a b,c.glb | baked | 6,000 | 2 | 6.00 | 20.0 kB |
+    | ok.glb | baked | 6,000 | 2 | 6.00 | 20.0 kB |
+
+    </details>
+    ");
 }
 
 #[test]
@@ -89,7 +119,26 @@ fn markdown_stays_within_its_size() {
 
 #[test]
 fn junit_has_a_case_for_each_scene() {
-    insta::assert_snapshot!(with(&record(), &some(), junit), @"");
+    insta::assert_snapshot!(with(&record(), &some(), junit), @r#"
+    <?xml version="1.0" encoding="UTF-8"?>
+    <testsuites name="lodbake" tests="4" skipped="0" failures="2" errors="0">
+        <testsuite name="budgets and regressions" tests="4" skipped="0" errors="0" failures="2">
+            <testcase name="art/gone.glb" classname="lodbake">
+                <failure message="gone.glb: mesh `shade`, level 1: gone" type="regression/vanished">gone.glb: mesh `shade`, level 1: gone
+      ask for `ratio = 0.4`</failure>
+            </testcase>
+            <testcase name="art/lamp.glb" classname="lodbake">
+                <failure message="lamp.glb: mesh `shade`, level 1: 5 triangles; limit 4 | 25 % over" type="budget/triangles">lamp.glb: mesh `shade`, level 1: 5 triangles; limit 4 | 25 % over
+      ask for `ratio = 0.4`</failure>
+            </testcase>
+            <testcase name="art/a b,c.glb" classname="lodbake">
+                <system-out>a b,c.glb: meshes[0]: &lt;odd&gt; &amp; 100%
+    of it</system-out>
+            </testcase>
+            <testcase name="art/ok.glb" classname="lodbake"/>
+        </testsuite>
+    </testsuites>
+    "#);
 }
 
 #[test]
@@ -120,7 +169,11 @@ fn sarif_has_places_and_steady_fingerprints() {
 
 #[test]
 fn github_gets_ten_of_each_kind() {
-    insta::assert_snapshot!(with(&record(), &some(), annotations), @"");
+    insta::assert_snapshot!(with(&record(), &some(), annotations), @r"
+    ::error file=art/gone.glb,title=lodbake regression/vanished::gone.glb: mesh `shade`, level 1: gone%0Aask for `ratio = 0.4`
+    ::error file=art/lamp.glb,title=lodbake budget/triangles::lamp.glb: mesh `shade`, level 1: 5 triangles; limit 4 | 25 %25 over%0Aask for `ratio = 0.4`
+    ::warning file=art/a b%2Cc.glb,title=lodbake bake/odd::a b,c.glb: meshes[0]: <odd> & 100%25%0Aof it
+    ");
     let many: Vec<Finding> = (0..40)
         .map(|i| finding(if i < 25 { Severity::Error } else { Severity::Warning }, Some("lamp.glb"), "much", 1.0))
         .collect();
