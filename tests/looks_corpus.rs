@@ -38,7 +38,8 @@ fn check(corpus: &Path, asset: &str, size: u32) -> usize {
         let next = &next.scenes[0].meshes[0].levels[0];
         assert!(next.triangles < level.triangles && next.triangles + 4 > level.triangles, "{asset}: one step");
         let over = next.d_rms.unwrap();
-        assert!(over > target, "{asset}: {} triangles already differ by {over} only", next.triangles);
+        // On a large mesh one step changes next to nothing, and not always for the worse.
+        assert!(over > target * 0.999, "{asset}: {} triangles already differ by {over} only", next.triangles);
     }
     reached.len()
 }
