@@ -366,3 +366,17 @@ fn a_scene_without_triangles_to_spare_is_copied() {
     assert_eq!(numbers(&run.summary(), &["baked", "copied", "jobs"]), [0, 1, 0]);
     assert_eq!(space.read("out/tiny.glb"), space.read("scenes/tiny.glb"));
 }
+
+#[test]
+fn an_image_of_an_unknown_kind_is_told_and_kept() {
+    let mut scene: Value = serde_json::from_slice(&Scene::of(&Shape::grid(12, 0.2)).gltf()).expect("JSON");
+    scene["images"] = json!([{ "uri": "data:image/png;base64,R0lGODlh" }]);
+    scene["textures"] = json!([{ "source": 0 }]);
+    scene["materials"] = json!([{ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }]);
+    scene["meshes"][0]["primitives"][0]["material"] = json!(0);
+    let space = space(&[("odd.gltf", scene.to_string().into_bytes())]);
+    let told = space.run_fine(&["pipeline.toml"]).stderr;
+    assert!(told.contains("`odd.gltf`: images[0]: the image is neither PNG, JPEG, WebP nor KTX2"), "{told}");
+    assert_eq!(space.json("out/odd.gltf")["images"], scene["images"]);
+    assert_eq!(space.json("out/report.json")["problems"][0]["place"], "images[0]");
+}

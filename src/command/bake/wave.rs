@@ -354,6 +354,8 @@ fn write_scene(scene: ReadScene, baked: &Baked, output: &OutputFolder, root: &Pa
         costs: None,
     };
     let mut costs = record::costs(&scene.scene, &record.meshes, &scene.images);
+    let unknown_images = (0..).zip(&scene.images).filter(|(_, image)| 0 < image.bytes && image.size.is_none());
+    let unknown_images: Vec<String> = unknown_images.map(|(index, _): (usize, _)| format!("images[{index}]")).collect();
     let embedded: u64 = scene.images.iter().map(|image| image.embedded).sum();
     let target = target(root, &relative, settings.format);
     let stem = target.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
@@ -398,6 +400,15 @@ fn write_scene(scene: ReadScene, baked: &Baked, output: &OutputFolder, root: &Pa
     })?;
     let mut problems: Vec<Problem> = warnings.iter().map(|w| record::warning(&relative, &w.place, &w.text)).collect();
     problems.extend(notes.iter().map(|note| record::warning(&relative, &note.place, &note.text)));
+    if todo.settings.appearance.record {
+        problems.extend(unknown_images.iter().map(|place| {
+            record::warning(
+                &relative,
+                place,
+                "the image is neither PNG, JPEG, WebP nor KTX2; looks are measured without it",
+            )
+        }));
+    }
     let missing =
         |uri: &String| record::warning(&relative, "", &format!("`{uri}` is not there, nor beside the output"));
     problems.extend(emitted.missing.iter().map(missing));
