@@ -27,22 +27,20 @@ pub struct SceneFacts {
 }
 
 /// First byte of remembered facts; another one means another shape of [`SceneFacts`].
-const VERSION: u8 = 3;
+const VERSION: u8 = 4;
 
 /// For the index.
 pub fn to_bytes(facts: &SceneFacts) -> Vec<u8> {
-    let mut bytes = vec![VERSION];
-    serde_json::to_writer(&mut bytes, facts).expect("facts are plain data");
-    bytes
+    postcard::to_extend(facts, vec![VERSION]).expect("facts are plain data")
 }
 
 /// From the index; `None` if they are of another version.
 pub fn from_bytes(bytes: &[u8]) -> Option<SceneFacts> {
-    let (&version, json) = bytes.split_first()?;
+    let (&version, rest) = bytes.split_first()?;
     if version != VERSION {
         return None;
     }
-    serde_json::from_slice(json).ok()
+    postcard::from_bytes(rest).ok()
 }
 
 impl SceneFacts {
