@@ -63,6 +63,19 @@ pub struct Part<'a> {
     /// The sequence kept to source vertices ([`crate::metric::Placement::Subset`]) and the source's vertices can be
     /// referred to.
     pub shareable: bool,
+    /// Which levels have their normals fitted to the source.
+    pub refit: Refit,
+}
+
+/// Which levels have their normals fitted to the source, so that vertices may part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refit {
+    /// None: levels refer to source vertices, or speed matters.
+    Never,
+    /// Those with less than three tenths of the triangles: below, one normal at a vertex cannot follow the surface.
+    Coarse,
+    /// Those that `Coarse` leaves out, and only they: for comparing.
+    Fine,
 }
 
 /// Why a level has the triangles that it has.
@@ -282,7 +295,17 @@ impl<'a> Cutter<'a> {
         }
         self.done = cut;
         self.replay.advance(cut);
-        let cuts = self.replay.primitives();
+        let mut cuts = self.replay.primitives();
+        let (left, whole) = (self.sequence.triangles_after(cut), self.sequence.triangles as usize);
+        let is_coarse = left as f64 <= whole as f64 * COARSE;
+        let refit = match self.part.refit {
+            Refit::Never => false,
+            Refit::Coarse => is_coarse,
+            Refit::Fine => !is_coarse,
+        };
+        if refit {
+            self.replay.refit(&mut cuts, SAME_NORMAL);
+        }
         let sources = &self.part.mesh.primitives;
         let error = match finish {
             Finish::Draft => 0.0,
@@ -327,19 +350,27 @@ impl<'a> Cutter<'a> {
     }
 }
 
+/// Share of the source's triangles below which normals are fitted: above it a face of the level has too few source faces
+/// to learn from.
+const COARSE: f64 = 0.3;
+
+/// Cosine of the angle within which the fitted normals of a vertex's faces stay one: 25°.
+const SAME_NORMAL: f64 = 0.906;
+
 /// Numbers vertices by first use, so that a GPU fetches them in order.
 fn order_by_use(cut: &mut CutPrimitive) {
     let mut order = vec![u32::MAX; cut.wedges.len()];
-    let mut wedges = Vec::with_capacity(cut.wedges.len());
+    let mut used = Vec::with_capacity(cut.wedges.len());
     for index in &mut cut.indices {
         let at = &mut order[*index as usize];
         if *at == u32::MAX {
-            *at = wedges.len() as u32;
-            wedges.push(cut.wedges[*index as usize]);
+            *at = used.len() as u32;
+            used.push(*index as usize);
         }
         *index = *at;
     }
-    cut.wedges = wedges;
+    cut.wedges = used.iter().map(|&old| cut.wedges[old]).collect();
+    cut.normals = cut.normals.take().map(|normals| used.iter().map(|&old| normals[old]).collect());
 }
 
 /// Points measured in each direction: beyond this many a further one hardly ever raises the maximum.

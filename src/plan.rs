@@ -290,6 +290,7 @@ fn simplify_settings(settings: &SimplifySettings) -> Settings {
         edges: EdgeWeights { border: weights.border, seam: weights.seam, crease: weights.crease },
         lock_border: *lock_border,
         memoryless: *effort != config::Effort::Fast,
+        by_visibility: *effort != config::Effort::Fast,
     }
 }
 

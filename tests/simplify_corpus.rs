@@ -7,7 +7,7 @@ use std::path::Path;
 use corpus::{corpus, scenes};
 use lodbake::gltf::read;
 use lodbake::gltf::scene::SourceMesh;
-use lodbake::lod::{ChainSettings, Part, Storage, Target, chain};
+use lodbake::lod::{ChainSettings, Part, Refit, Storage, Target, chain};
 use lodbake::mesh::layout::AttributeScale;
 use lodbake::mesh::{Attribute, Level, LevelVertices, Mesh};
 use lodbake::metric::Placement;
@@ -17,8 +17,8 @@ use rayon::prelude::*;
 
 fn settings(metric: MetricKind, placement: Placement) -> Settings {
     let attributes = AttributeScale { normal: 0.003, texcoord: 0.3, color: 0.1 };
-    let edges = EdgeWeights { border: 1.0, seam: 0.3, crease: 0.01 };
-    Settings { metric, placement, attributes, edges, lock_border: false, memoryless: true }
+    let edges = EdgeWeights { border: 1.0, seam: 0.3, crease: 0.04 };
+    Settings { metric, placement, attributes, edges, lock_border: false, memoryless: true, by_visibility: true }
 }
 
 #[test]
@@ -48,7 +48,12 @@ fn check_all(file: &Path, meshes: &[SourceMesh]) -> usize {
 fn check(place: &str, mesh: &Mesh, settings: &Settings) {
     let sequence = simplify(mesh, settings);
     let shareable = settings.placement == Placement::Subset;
-    let part = Part { mesh, sequence: Some(&sequence), shareable };
+    let part = Part {
+        mesh,
+        sequence: Some(&sequence),
+        shareable,
+        refit: if shareable { Refit::Never } else { Refit::Coarse },
+    };
     let targets = vec![Target::Ratio(0.5), Target::Ratio(0.1), Target::Triangles(12)];
     let chain = chain(
         &[part],

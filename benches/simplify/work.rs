@@ -1,6 +1,6 @@
 //! The three works that are compared, each on one mesh and in one thread.
 
-use lodbake::lod::{ChainSettings, Part, Source, Storage, Target, chain};
+use lodbake::lod::{ChainSettings, Part, Refit, Source, Storage, Target, chain};
 use lodbake::mesh::Mesh;
 use lodbake::mesh::layout::{AttributeScale, frame};
 use lodbake::metric::Placement;
@@ -78,16 +78,22 @@ fn own(mesh: &Mesh, memoryless: bool) -> Report {
         metric: MetricKind::Its,
         placement: Placement::Optimal,
         attributes: AttributeScale { normal: 0.003, texcoord: 0.3, color: 0.1 },
-        edges: EdgeWeights { border: 1.0, seam: 0.3, crease: 0.01 },
+        edges: EdgeWeights { border: 1.0, seam: 0.3, crease: 0.04 },
         lock_border: false,
         memoryless,
+        by_visibility: memoryless,
     };
     let targets = RATIOS.map(Target::Ratio).to_vec();
     let settings_of_chain = ChainSettings { targets, storage: Storage::Smallest, vertex_cache: true };
     let began = now();
     let sequence = simplify(mesh, &settings);
     let simplified = now();
-    let part = Part { mesh, sequence: Some(&sequence), shareable: false };
+    let part = Part {
+        mesh,
+        sequence: Some(&sequence),
+        shareable: false,
+        refit: if settings.memoryless { Refit::Coarse } else { Refit::Never },
+    };
     let chain = chain(&[part], &settings_of_chain, None);
     let chained = now();
     let levels = chain.levels.iter().map(|level| (level.triangles, level.error / frame(&mesh.primitives).1)).collect();

@@ -162,7 +162,7 @@ pub(crate) struct SimplifyTable {
     #[schemars(range(min = 0), extend("default" = defaults::SEAM))]
     pub seam: Option<f64>,
 
-    /// Weight of creases, edges where normals part; 0 or more. Default: 0.01.
+    /// Weight of creases, edges where normals part; 0 or more. Default: 0.04.
     #[schemars(range(min = 0), extend("default" = defaults::CREASE))]
     pub crease: Option<f64>,
 

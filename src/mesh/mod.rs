@@ -6,6 +6,7 @@
 pub mod hash;
 pub mod layout;
 pub mod topology;
+pub mod visible;
 pub mod weld;
 
 use serde::{Deserialize, Serialize};

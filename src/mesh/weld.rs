@@ -96,6 +96,23 @@ pub fn weld(mesh: &Mesh, layout: &Layout) -> Weld {
     out
 }
 
+/// Which stored vertices are at the same place.
+pub(super) struct Places {
+    /// Distinct places.
+    pub count: usize,
+    /// Place of each stored vertex, primitive after primitive.
+    pub vertex: Vec<u32>,
+}
+
+/// Welds all vertices of `mesh` by position alone.
+pub(super) fn positions(mesh: &Mesh) -> Places {
+    let mut table = Table::with_capacity(mesh.vertices());
+    let mut distinct = Vec::with_capacity(mesh.vertices());
+    let stored = mesh.primitives.iter().flat_map(Primitive::positions);
+    let vertex = stored.map(|p| table.find_or_insert(p.map(|x| (x + 0.0).to_bits()), &mut distinct)).collect();
+    Places { count: distinct.len(), vertex }
+}
+
 fn used_vertices(primitive: &Primitive) -> Vec<bool> {
     let mut used = vec![false; primitive.count];
     for &i in &primitive.indices {

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::mesh::Mesh;
 use crate::mesh::layout::{AttributeScale, Layout};
 use crate::mesh::topology::{self, Contraction, EdgeKind, NEXT, Topology};
+use crate::mesh::visible::visible;
 use crate::metric::its::{EdgeWeights, Its};
 use crate::metric::qem::Qem;
 use crate::metric::{ErrorMetric, Placement, Price};
@@ -52,6 +53,9 @@ pub struct Settings {
     /// Metrics that can, rebuild their state from the current surface after each contraction: closer to the source,
     /// more work.
     pub memoryless: bool,
+    /// Area counts by how much of it can be seen from outside ([`visible`]), where no other weights are given. Only `its`
+    /// heeds it.
+    pub by_visibility: bool,
 }
 
 /// Simplifies `mesh` as far as it goes and returns the recorded sequence.
@@ -64,12 +68,19 @@ pub fn simplify(mesh: &Mesh, settings: &Settings) -> Progressive {
 pub fn simplify_weighted(mesh: &Mesh, settings: &Settings, weights: &[f64]) -> Progressive {
     let layout = Layout::new(mesh, settings.attributes);
     let (mut surface, weld) = Topology::new(mesh, &layout);
-    let narrow: Vec<f32> = weights.iter().map(|&weight| weight as f32).collect();
-    let weights = if weights.is_empty() { narrow } else { topology::of_faces(mesh, &weld, &narrow) };
+    let weights: Vec<f32> = if weights.is_empty() && settings.by_visibility && settings.metric == MetricKind::Its {
+        visible(mesh).into_iter().map(|share| UNSEEN + (1.0 - UNSEEN) * share).collect()
+    } else {
+        weights.iter().map(|&weight| weight as f32).collect()
+    };
+    let weights = if weights.is_empty() { weights } else { topology::of_faces(mesh, &weld, &weights) };
     let recorder = Recorder::new(mesh, &surface, &layout, weld);
     let locks = Locks::new(&surface, settings.lock_border);
     build(&mut surface, settings, weights, &locks, recorder)
 }
+
+/// Weight of a triangle that cannot be seen from outside, against 1: it may be seen from within, or when things move.
+const UNSEEN: f32 = 0.1;
 
 /// The only place that builds a metric.
 fn build(

@@ -4,6 +4,8 @@
 //! tangents and morph displacements are blended, joint influences are joined and pruned, everything else (categories,
 //! custom attributes) is taken from the nearer end.
 
+mod refit;
+
 use super::progressive::Progressive;
 use crate::mesh::layout::{Field, FieldKind, Layout};
 use crate::mesh::weld::{NONE, Weld, weld};
@@ -78,6 +80,8 @@ pub struct CutPrimitive {
     pub wedges: Vec<u32>,
     /// Triangle list over local vertices.
     pub indices: Vec<u32>,
+    /// Normal of each local vertex, if they were fitted ([`Replay::refit`]).
+    pub normals: Option<Vec<[f32; 3]>>,
 }
 
 impl<'a> Replay<'a> {
@@ -190,7 +194,8 @@ impl<'a> Replay<'a> {
     /// The vertices of `cut` with all attributes and morph targets of primitive `index`, in the source's formats.
     pub fn vertices(&self, index: usize, cut: &CutPrimitive) -> LevelOwnVertices {
         let primitive = &self.mesh.primitives[index];
-        let normals = primitive.attribute("NORMAL").map(|_| self.normals(cut));
+        let fitted = || cut.normals.clone().unwrap_or_else(|| self.normals(cut));
+        let normals = primitive.attribute("NORMAL").map(|_| fitted());
         let attribute = |source: &Attribute| {
             let mut values = Vec::with_capacity(cut.wedges.len() * source.components);
             match self.welded.fields.iter().find(|f| f.name == source.name && f.components == source.components) {

@@ -11,9 +11,10 @@ const BALANCED: Settings = Settings {
     metric: MetricKind::Its,
     placement: Placement::Optimal,
     attributes: AttributeScale { normal: 0.003, texcoord: 0.3, color: 0.1 },
-    edges: EdgeWeights { border: 1.0, seam: 0.3, crease: 0.01 },
+    edges: EdgeWeights { border: 1.0, seam: 0.3, crease: 0.04 },
     lock_border: false,
     memoryless: true,
+    by_visibility: true,
 };
 
 /// Every metric with every placement.

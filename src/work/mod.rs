@@ -18,12 +18,13 @@ use serde::de::DeserializeOwned;
 use crate::appearance::looks::Looks;
 use crate::cache::{Bucket, Cache, Lookup};
 use crate::key::JobKey;
-use crate::lod::{Chain, ChainLevel, Part, chain};
+use crate::lod::{self, Chain, ChainLevel, Part, Refit, Stop, chain};
 use crate::mesh::Level;
-use crate::plan::{ChainTask, LookTask, MeshLook, PartTask, Plan, SequenceTask};
+use crate::metric::Placement;
+use crate::plan::{ChainTask, LookTask, MeshLook, PartTask, Plan, Recipe, SequenceTask};
 use crate::progress::{Event, Reporter};
 use crate::simplify::progressive::Progressive;
-use crate::simplify::{simplify, simplify_weighted};
+use crate::simplify::{MetricKind, simplify, simplify_weighted};
 
 pub use look::LevelLook;
 
@@ -114,19 +115,22 @@ fn by_scene<T>(mut tasks: Vec<T>, scene: impl Fn(&T) -> usize) -> Vec<Vec<T>> {
 /// Cuts a chain; of several recipes and rounds, each level is taken from the one that looks best.
 fn cut(task: &ChainTask, sequences: &BTreeMap<JobKey, Progressive>, looks: Option<&Arc<Looks>>) -> Chain {
     let judge = task.judged.as_ref().zip(looks).map(|(look, looks)| Judge::new(&task.parts, look, looks));
+    let refits: Vec<Refit> = task.recipes.iter().map(refit).collect();
+    let recorded = |recipe: usize| -> Vec<Option<&Progressive>> {
+        task.parts.iter().map(|part| part.sequences.get(recipe).map(|key| &sequences[key])).collect()
+    };
     let Some(judge) = &judge else {
-        let own: Vec<Option<&Progressive>> = task.parts.iter().map(|part| recorded(part, 0, sequences)).collect();
-        return chain(&parts(&task.parts, &own), &task.settings, None);
+        return chain(&parts(&task.parts, &recorded(0), refits[0]), &task.settings, None);
     };
     let difference = |levels: &[Option<Level>]| judge.difference(levels);
     let mut candidates: Vec<Chain> = (0..task.recipes.len())
         .map(|recipe| {
-            let own: Vec<_> = task.parts.iter().map(|part| recorded(part, recipe, sequences)).collect();
-            named(chain(&parts(&task.parts, &own), &task.settings, Some(&difference)), task, recipe, "")
+            let parts = parts(&task.parts, &recorded(recipe), refits[recipe]);
+            named(chain(&parts, &task.settings, Some(&difference)), task, recipe, "")
         })
         .collect();
     if task.rounds == 0 {
-        return best_of(candidates, difference);
+        return joined(best_of(candidates, difference).into_iter().map(|(_, level)| level));
     }
     let around = Loop::new(judge, &task.parts);
     let sum = |chain: &Chain| chain.levels.iter().map(|level| around.difference(&level.parts)).sum::<f64>();
@@ -134,6 +138,7 @@ fn cut(task: &ChainTask, sequences: &BTreeMap<JobKey, Progressive>, looks: Optio
     let winner = (0..sums.len()).reduce(|best, next| if sums[next] < sums[best] { next } else { best }).unwrap_or(0);
     let start = around.visibility();
     let mut weights = start.clone();
+    let mut rounds: Vec<Vec<Option<Progressive>>> = Vec::new();
     for round in 0..=task.rounds {
         let made: Vec<Option<Progressive>> = (task.parts.par_iter().zip(&weights.0))
             .map(|(part, weights)| {
@@ -141,30 +146,60 @@ fn cut(task: &ChainTask, sequences: &BTreeMap<JobKey, Progressive>, looks: Optio
                 (!is_left).then(|| simplify_weighted(&part.mesh, &task.recipes[winner].settings, weights))
             })
             .collect();
-        let own: Vec<Option<&Progressive>> = made.iter().map(Option::as_ref).collect();
-        let next = chain(&parts(&task.parts, &own), &task.settings, Some(&difference));
+        let next = chain(&parts(&task.parts, &borrowed(&made), refits[winner]), &task.settings, Some(&difference));
         if round < task.rounds {
             let levels: Vec<Vec<Option<Level>>> = next.levels.iter().map(|level| level.parts.clone()).collect();
             weights = around.again(&weights, &start, &levels);
         }
         candidates.push(named(next, task, winner, &format!(", round {round}")));
+        rounds.push(made);
     }
-    best_of(candidates, |levels| around.difference(levels))
+    let seen = |levels: &[Option<Level>]| around.difference(levels);
+    let winners = best_of(candidates, seen).into_iter().map(|(number, level)| {
+        if refits[winner] == Refit::Never || level.stop == Stop::LookLimit {
+            return level;
+        }
+        // The same cut with its normals fitted where they were not, and not where they were.
+        let round = number.checked_sub(task.recipes.len());
+        let own = round.map_or_else(|| recorded(number), |round| borrowed(&rounds[round]));
+        let targets = vec![task.settings.targets[level.target]];
+        let settings = lod::ChainSettings { targets, ..task.settings.clone() };
+        let parts = |refit| parts(&task.parts, &own, refit);
+        let others = [Refit::Never, Refit::Fine].map(|refit| chain(&parts(refit), &settings, None).levels.pop());
+        let others = others.into_iter().flatten().map(|other| ChainLevel {
+            target: level.target,
+            recipe: level.recipe.clone(),
+            ..other
+        });
+        let mut best = (seen(&level.parts), level.clone());
+        for other in others.filter(|other| other.parts != level.parts) {
+            let difference = seen(&other.parts);
+            if difference < best.0 {
+                best = (difference, other);
+            }
+        }
+        best.1
+    });
+    joined(winners)
 }
 
-fn recorded<'a>(
-    part: &PartTask,
-    recipe: usize,
-    sequences: &'a BTreeMap<JobKey, Progressive>,
-) -> Option<&'a Progressive> {
-    part.sequences.get(recipe).map(|key| &sequences[key])
+fn borrowed(sequences: &[Option<Progressive>]) -> Vec<Option<&Progressive>> {
+    sequences.iter().map(Option::as_ref).collect()
 }
 
-fn parts<'a>(tasks: &'a [PartTask], sequences: &[Option<&'a Progressive>]) -> Vec<Part<'a>> {
+/// Only where vertices are the level's own, and the time is there.
+fn refit(recipe: &Recipe) -> Refit {
+    let settings = &recipe.settings;
+    let has_time = settings.memoryless && settings.metric == MetricKind::Its;
+    if has_time && settings.placement == Placement::Optimal { Refit::Coarse } else { Refit::Never }
+}
+
+fn parts<'a>(tasks: &'a [PartTask], sequences: &[Option<&'a Progressive>], refit: Refit) -> Vec<Part<'a>> {
     let part = |(task, sequence): (&'a PartTask, Option<&'a Progressive>)| Part {
         mesh: &task.mesh,
         sequence,
         shareable: task.shareable,
+        refit,
     };
     tasks.iter().zip(sequences.iter().copied()).map(part).collect()
 }
@@ -178,31 +213,37 @@ fn named(mut chain: Chain, task: &ChainTask, recipe: usize, more: &str) -> Chain
     chain
 }
 
-/// For each target the level that differs least; where looks were the target, the one with the fewest triangles. The
-/// first of equals. Levels that are no coarser than the one before them are left out.
-fn best_of(mut candidates: Vec<Chain>, difference: impl Fn(&[Option<Level>]) -> f64) -> Chain {
-    if candidates.len() < 2 {
-        return candidates.pop().unwrap_or(Chain { levels: Vec::new() });
+/// For each target the level that differs least, with the number of its chain; where looks were the target, the one with
+/// the fewest triangles. The first of equals.
+fn best_of(candidates: Vec<Chain>, difference: impl Fn(&[Option<Level>]) -> f64) -> Vec<(usize, ChainLevel)> {
+    let only = candidates.len() < 2;
+    let mut by_target: BTreeMap<usize, Vec<(usize, ChainLevel)>> = BTreeMap::new();
+    for (number, level) in
+        candidates.into_iter().enumerate().flat_map(|(i, c)| c.levels.into_iter().map(move |l| (i, l)))
+    {
+        by_target.entry(level.target).or_default().push((number, level));
     }
-    let mut by_target: BTreeMap<usize, Vec<ChainLevel>> = BTreeMap::new();
-    for level in candidates.into_iter().flat_map(|chain| chain.levels) {
-        by_target.entry(level.target).or_default().push(level);
-    }
-    let mut chain = Chain { levels: Vec::new() };
+    let rank = |level: &ChainLevel| match level.stop {
+        _ if only => 0.0,
+        Stop::LookLimit => level.triangles as f64,
+        _ => difference(&level.parts),
+    };
+    let best = |levels: Vec<(usize, ChainLevel)>| {
+        let ranked = levels.into_iter().map(|(number, level)| (rank(&level), number, level));
+        ranked.reduce(|best, next| if next.0 < best.0 { next } else { best }).map(|(_, number, level)| (number, level))
+    };
+    by_target.into_values().filter_map(best).collect()
+}
+
+/// A chain of these levels, without those that are no coarser than the one before them.
+fn joined(levels: impl Iterator<Item = ChainLevel>) -> Chain {
     let mut before = usize::MAX;
-    for levels in by_target.into_values() {
-        let rank = |level: &ChainLevel| match level.stop {
-            crate::lod::Stop::LookLimit => level.triangles as f64,
-            _ => difference(&level.parts),
-        };
-        let ranked = levels.into_iter().map(|level| (rank(&level), level));
-        let best = ranked.reduce(|best, next| if next.0 < best.0 { next } else { best });
-        if let Some((_, level)) = best.filter(|(_, level)| level.triangles < before) {
-            before = level.triangles;
-            chain.levels.push(level);
-        }
-    }
-    chain
+    let coarser = levels.filter(|level| {
+        let is_coarser = level.triangles < before;
+        before = before.min(level.triangles);
+        is_coarser
+    });
+    Chain { levels: coarser.collect() }
 }
 
 /// Figures of all chains whose looks are recorded: from the cache, or from pictures.
