@@ -53,7 +53,7 @@ fn a_level_by_appearance_is_the_coarsest_within_its_target() {
     assert!(checked >= 8, "{checked} levels");
 }
 
-/// Minutes of work: `cargo test --release --test looks_corpus -- --ignored --nocapture`.
+/// Minutes of work (`LODBAKE_ASSET=a,b` for some assets): `cargo test --release --test looks_corpus -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes minutes"]
 #[expect(clippy::print_stdout, reason = "the figures are what it is run for")]
@@ -61,6 +61,9 @@ fn so_it_is_at_512_pixels_for_every_asset() {
     let Some(corpus) = corpus() else { return };
     for entry in std::fs::read_dir(corpus.join("quality")).unwrap() {
         let asset = entry.unwrap().file_name().into_string().unwrap();
+        if std::env::var("LODBAKE_ASSET").is_ok_and(|wanted| !wanted.split(',').any(|one| one == asset)) {
+            continue;
+        }
         let began = std::time::Instant::now();
         println!("{asset}: {} levels, {:.0} s", check(&corpus, &asset, 512), began.elapsed().as_secs_f64());
     }
