@@ -141,7 +141,12 @@ pub fn chain(parts: &[Part], settings: &ChainSettings, judge: Option<Judge>) -> 
             Target::Appearance(limit) => {
                 let Some(judge) = judge else { continue };
                 let difference = |cuts: &[usize]| judge(&cut_all(parts, &mut cutters, cuts, Finish::Draft));
-                let cuts = cuts_by_looks(&allocation, limit, difference);
+                let left =
+                    |cuts: &[usize]| -> usize { sequences.iter().zip(cuts).map(|(s, &c)| s.triangles_after(c)).sum() };
+                let fine =
+                    |steps: &usize| (left(&allocation.cuts_after(*steps)) + fixed) as f64 > COARSE * source as f64;
+                let first = first_not(allocation.steps(), fine);
+                let cuts = cuts_by_looks(&allocation, limit, first, difference);
                 let all = sequences.iter().zip(&cuts).all(|(s, &c)| c == s.steps.len());
                 (cuts, if all { Stop::NoLegalPair } else { Stop::LookLimit })
             }
@@ -194,18 +199,36 @@ fn cut_all(parts: &[Part], cutters: &mut [Cutter], cuts: &[usize], finish: Finis
 }
 
 /// The cuts after which the next contraction, anywhere in the mesh, exceeds the limit. The difference grows with the
-/// contractions, though not strictly: the search by halves finds one such place.
-fn cuts_by_looks(allocation: &Allocation, limit: f64, mut difference: impl FnMut(&[usize]) -> f64) -> Vec<usize> {
+/// contractions, though not strictly: the search by halves finds one such place. It begins at `first`, behind which the
+/// difference is smaller than before, since normals of coarse levels are fitted.
+fn cuts_by_looks(
+    allocation: &Allocation,
+    limit: f64,
+    first: usize,
+    mut difference: impl FnMut(&[usize]) -> f64,
+) -> Vec<usize> {
     let (mut within, mut over) = (0, allocation.steps() + 1);
+    let mut next = first.min(over - 1).max(1);
     while 1 < over - within {
-        let middle = within + (over - within) / 2;
+        let middle = next;
         if difference(&allocation.cuts_after(middle)) <= limit {
             within = middle;
         } else {
             over = middle;
         }
+        next = within + (over - within) / 2;
     }
     allocation.cuts_after(within)
+}
+
+/// The first number up to `last` for which `holds` is false, if it is true up to there; else `last`.
+fn first_not(last: usize, holds: impl Fn(&usize) -> bool) -> usize {
+    let (mut low, mut high) = (0, last);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        (low, high) = if holds(&middle) { (middle + 1, high) } else { (low, middle) };
+    }
+    low
 }
 
 /// Triangles asked for; at least one.
