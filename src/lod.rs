@@ -9,6 +9,7 @@ use crate::allocate::Allocation;
 use crate::distance::near::Sheet;
 use crate::mesh::{Attribute, Level, LevelPrimitive, LevelVertices, Mesh, Primitive};
 use crate::simplify::progressive::Progressive;
+use crate::simplify::replay::refit::{Fit, Importance};
 use crate::simplify::replay::{CutPrimitive, Replay, Welded};
 
 /// How coarse a level is.
@@ -63,19 +64,24 @@ pub struct Part<'a> {
     /// The sequence kept to source vertices ([`crate::metric::Placement::Subset`]) and the source's vertices can be
     /// referred to.
     pub shareable: bool,
-    /// Which levels have their normals fitted to the source.
+    /// Which levels are fitted to the source.
     pub refit: Refit,
+    /// A fit leaves vertices of open borders where they are.
+    pub hold_borders: bool,
 }
 
-/// Which levels have their normals fitted to the source, so that vertices may part.
+/// Which levels are fitted to the source when they are cut, and what of them ([`crate::simplify::replay::refit`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refit {
     /// None: levels refer to source vertices, or speed matters.
     Never,
-    /// Those with less than three tenths of the triangles: below, one normal at a vertex cannot follow the surface.
+    /// Shape and normals of those with less than three tenths of the triangles: below, one normal at a vertex cannot
+    /// follow the surface.
     Coarse,
-    /// Those that `Coarse` leaves out, and only they: for comparing.
-    Fine,
+    /// The shape of all.
+    Shape,
+    /// Shape and normals of all.
+    Whole,
 }
 
 /// Why a level has the triangles that it has.
@@ -266,6 +272,7 @@ struct Cutter<'a> {
     replay: Replay<'a>,
     done: usize,
     source: Source<'a>,
+    importance: Option<Importance>,
 }
 
 impl<'a> Cutter<'a> {
@@ -278,6 +285,7 @@ impl<'a> Cutter<'a> {
             replay: Replay::new(part.mesh, welded, sequence),
             done: 0,
             source: Source::new(part.mesh, welded),
+            importance: None,
         }
     }
 
@@ -321,13 +329,17 @@ impl<'a> Cutter<'a> {
         let mut cuts = self.replay.primitives();
         let (left, whole) = (self.sequence.triangles_after(cut), self.sequence.triangles as usize);
         let is_coarse = left as f64 <= whole as f64 * COARSE;
-        let refit = match self.part.refit {
-            Refit::Never => false,
-            Refit::Coarse => is_coarse,
-            Refit::Fine => !is_coarse,
+        let hold_borders = self.part.hold_borders;
+        let fit = match self.part.refit {
+            Refit::Never => None,
+            Refit::Coarse if !is_coarse => None,
+            Refit::Shape => Some(Fit { shape: true, normals: None, hold_borders }),
+            Refit::Coarse | Refit::Whole => Some(Fit { shape: true, normals: Some(SAME_NORMAL), hold_borders }),
         };
-        if refit {
-            self.replay.refit(&mut cuts, SAME_NORMAL);
+        if let Some(fit) = fit {
+            let (mesh, welded) = (self.part.mesh, self.welded);
+            let importance = self.importance.get_or_insert_with(|| Importance::new(mesh, welded));
+            self.replay.refit(&mut cuts, importance, fit);
         }
         let sources = &self.part.mesh.primitives;
         let error = match finish {
@@ -373,7 +385,7 @@ impl<'a> Cutter<'a> {
     }
 }
 
-/// Share of the source's triangles below which normals are fitted: above it a face of the level has too few source faces
+/// Share of the source's triangles below which levels are fitted: above it a face of the level has too few source faces
 /// to learn from.
 const COARSE: f64 = 0.3;
 

@@ -72,6 +72,14 @@ impl Quadric {
     }
 }
 
+/// Rows of the inverse of the symmetric matrix `[xx, xy, xz, yy, yz, zz]`; `None` if it has none.
+pub fn inverse([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> Option<[[f64; 3]; 3]> {
+    let (cx, cy, cz) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
+    let by = 1.0 / (xx * cx + xy * cy + xz * cz);
+    let (dy, dyz, dz) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);
+    by.is_finite().then(|| [[cx, cy, cz], [cy, dy, dyz], [cz, dyz, dz]].map(|row| scale(row, by)))
+}
+
 /// A quadric around a place of its own, its origin: `q(x) = xᵀA x + 2 b·x + c` for the offset `x` from there.
 ///
 /// Near its origin nothing large cancels, so single precision is enough, and sums are a few vector additions. Row `i` is

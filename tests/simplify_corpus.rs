@@ -53,6 +53,7 @@ fn check(place: &str, mesh: &Mesh, settings: &Settings) {
         sequence: Some(&sequence),
         shareable,
         refit: if shareable { Refit::Never } else { Refit::Coarse },
+        hold_borders: false,
     };
     let targets = vec![Target::Ratio(0.5), Target::Ratio(0.1), Target::Triangles(12)];
     let chain = chain(

@@ -93,6 +93,7 @@ fn own(mesh: &Mesh, memoryless: bool) -> Report {
         sequence: Some(&sequence),
         shareable: false,
         refit: if settings.memoryless { Refit::Coarse } else { Refit::Never },
+        hold_borders: false,
     };
     let chain = chain(&[part], &settings_of_chain, None);
     let chained = now();

@@ -4,7 +4,7 @@
 //! tangents and morph displacements are blended, joint influences are joined and pruned, everything else (categories,
 //! custom attributes) is taken from the nearer end.
 
-mod refit;
+pub mod refit;
 
 use super::progressive::Progressive;
 use crate::mesh::layout::{Field, FieldKind, Layout};
@@ -71,6 +71,8 @@ pub struct Replay<'a> {
     passive: Passive,
     /// Wedges of the triangles of each primitive that were left at the last cut.
     left: Vec<Vec<[u32; 3]>>,
+    /// What the last fit has changed.
+    before: refit::Before,
 }
 
 /// One primitive at a cut.
@@ -111,12 +113,14 @@ impl<'a> Replay<'a> {
             wedge_vertex: weld.wedge_vertex.clone(),
             positions: welded.positions.clone(),
             values,
+            before: refit::Before::default(),
             left: (0..mesh.primitives.len()).map(|index| welded.wedges(mesh, index).collect()).collect(),
         }
     }
 
     /// Goes on until `steps` steps are done; never back.
     pub fn advance(&mut self, steps: usize) {
+        self.take_back();
         let columns = self.sequence.columns as usize;
         for index in self.steps..steps.min(self.sequence.steps.len()) {
             let step = &self.sequence.steps[index];

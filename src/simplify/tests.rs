@@ -264,3 +264,85 @@ proptest! {
         prop_assert!(sequence.steps.windows(2).all(|pair| pair[1].triangles <= pair[0].triangles));
     }
 }
+
+/// A cut of `mesh` at `triangles`, and what fitting makes of it.
+fn fitted<R>(
+    mesh: &Mesh,
+    triangles: usize,
+    hold_borders: bool,
+    see: impl Fn(&Replay, &[replay::CutPrimitive]) -> R,
+) -> [R; 3] {
+    let sequence = simplify(mesh, &BALANCED);
+    let welded = Welded::new(mesh);
+    let mut replay = Replay::new(mesh, &welded, &sequence);
+    let steps = sequence.cut_at(triangles);
+    replay.advance(steps);
+    let mut cuts = replay.primitives();
+    let before = see(&replay, &cuts);
+    let fit = replay::refit::Fit { shape: true, normals: Some(0.9), hold_borders };
+    replay.refit(&mut cuts, &replay::refit::Importance::new(mesh, &welded), fit);
+    let after = see(&replay, &cuts);
+    replay.advance(steps);
+    let cuts = replay.primitives();
+    [before, after, see(&replay, &cuts)]
+}
+
+#[test]
+fn a_fit_moves_a_coarse_surface_closer_and_is_taken_back() {
+    let mesh = torus(48, 24);
+    // Mean distance of the faces' corners, middles and edges from the true surface.
+    let off = |replay: &Replay, cuts: &[replay::CutPrimitive]| {
+        let at = |i: u32| replay.wedge_position(cuts[0].wedges[i as usize]).map(f64::from);
+        let mut sum = 0.0;
+        for t in cuts[0].indices.chunks_exact(3) {
+            let p = [at(t[0]), at(t[1]), at(t[2])];
+            for w in [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [1.0 / 3.0; 3]] {
+                let q = [0, 1, 2].map(|i| p[0][i] * w[0] + p[1][i] * w[1] + p[2][i] * w[2]);
+                let r = (q[0] * q[0] + q[1] * q[1]).sqrt() - 1.0;
+                sum += ((r * r + q[2] * q[2]).sqrt() - 0.4).abs();
+            }
+        }
+        sum / cuts[0].indices.len() as f64
+    };
+    let [before, after, again] = fitted(&mesh, 160, false, off);
+    assert!(after < 0.95 * before, "{before} became {after}");
+    assert_eq!(before, again);
+}
+
+#[test]
+fn a_fit_keeps_a_flat_grid_flat_and_its_texture_in_place() {
+    let mesh = one(grid(16, 16, |u, v| ([u, v, 0.5], [0.25 + u * 0.5, 1.0 - v])));
+    let worst = |replay: &Replay, cuts: &[replay::CutPrimitive]| {
+        let own = replay.vertices(0, &cuts[0]);
+        let rows = own.attributes[0].values.chunks_exact(3).zip(own.attributes[1].values.chunks_exact(2));
+        let off = rows.map(|(p, t)| {
+            let texture = (t[0] - (0.25 + p[0] * 0.5)).abs().max((t[1] - (1.0 - p[1])).abs());
+            texture.max((p[2] - 0.5).abs())
+        });
+        off.fold(0.0, f32::max)
+    };
+    let [_, after, _] = fitted(&mesh, 20, false, worst);
+    assert!(after < 1e-3, "{after}");
+}
+
+#[test]
+fn a_fit_leaves_held_borders_where_they_are() {
+    let mesh = one(grid(16, 16, |u, v| ([u, v, (u * 7.0).sin() * (v * 5.0).cos() * 0.2], [u, v])));
+    // Ends of edges of one face.
+    let corners = |replay: &Replay, cuts: &[replay::CutPrimitive]| {
+        let mut edges = std::collections::BTreeMap::new();
+        for t in cuts[0].indices.chunks_exact(3) {
+            let w = [0, 1, 2].map(|i| replay.wedge_position(cuts[0].wedges[t[i] as usize]).map(f32::to_bits));
+            for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+                *edges.entry([w[a].min(w[b]), w[a].max(w[b])]).or_insert(0) += 1;
+            }
+        }
+        let border: std::collections::BTreeSet<_> =
+            edges.into_iter().filter(|&(_, faces)| faces == 1).flat_map(|(edge, _)| edge).collect();
+        border
+    };
+    let [before, after, _] = fitted(&mesh, 60, true, corners);
+    assert_eq!(before, after);
+    let [before, after, _] = fitted(&mesh, 60, false, corners);
+    assert_ne!(before, after);
+}

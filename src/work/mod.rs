@@ -120,12 +120,12 @@ fn cut(task: &ChainTask, sequences: &BTreeMap<JobKey, Progressive>, looks: Optio
         task.parts.iter().map(|part| part.sequences.get(recipe).map(|key| &sequences[key])).collect()
     };
     let Some(judge) = &judge else {
-        return chain(&parts(&task.parts, &recorded(0), refits[0]), &task.settings, None);
+        return chain(&parts(task, &recorded(0), refits[0]), &task.settings, None);
     };
     let difference = |levels: &[Option<Level>]| judge.difference(levels);
     let mut candidates: Vec<Chain> = (0..task.recipes.len())
         .map(|recipe| {
-            let parts = parts(&task.parts, &recorded(recipe), refits[recipe]);
+            let parts = parts(task, &recorded(recipe), refits[recipe]);
             named(chain(&parts, &task.settings, Some(&difference)), task, recipe, "")
         })
         .collect();
@@ -146,7 +146,7 @@ fn cut(task: &ChainTask, sequences: &BTreeMap<JobKey, Progressive>, looks: Optio
                 (!is_left).then(|| simplify_weighted(&part.mesh, &task.recipes[winner].settings, weights))
             })
             .collect();
-        let next = chain(&parts(&task.parts, &borrowed(&made), refits[winner]), &task.settings, Some(&difference));
+        let next = chain(&parts(task, &borrowed(&made), refits[winner]), &task.settings, Some(&difference));
         if round < task.rounds {
             let levels: Vec<Vec<Option<Level>>> = next.levels.iter().map(|level| level.parts.clone()).collect();
             weights = around.again(&weights, &start, &levels);
@@ -159,13 +159,14 @@ fn cut(task: &ChainTask, sequences: &BTreeMap<JobKey, Progressive>, looks: Optio
         if refits[winner] == Refit::Never || level.stop == Stop::LookLimit {
             return level;
         }
-        // The same cut with its normals fitted where they were not, and not where they were.
+        // The same cut as it came, with its shape fitted, and with its normals too.
         let round = number.checked_sub(task.recipes.len());
         let own = round.map_or_else(|| recorded(number), |round| borrowed(&rounds[round]));
         let targets = vec![task.settings.targets[level.target]];
         let settings = lod::ChainSettings { targets, ..task.settings.clone() };
-        let parts = |refit| parts(&task.parts, &own, refit);
-        let others = [Refit::Never, Refit::Fine].map(|refit| chain(&parts(refit), &settings, None).levels.pop());
+        let parts = |refit| parts(task, &own, refit);
+        let others =
+            [Refit::Never, Refit::Shape, Refit::Whole].map(|refit| chain(&parts(refit), &settings, None).levels.pop());
         let others = others.into_iter().flatten().map(|other| ChainLevel {
             target: level.target,
             recipe: level.recipe.clone(),
@@ -194,14 +195,16 @@ fn refit(recipe: &Recipe) -> Refit {
     if has_time && settings.placement == Placement::Optimal { Refit::Coarse } else { Refit::Never }
 }
 
-fn parts<'a>(tasks: &'a [PartTask], sequences: &[Option<&'a Progressive>], refit: Refit) -> Vec<Part<'a>> {
+fn parts<'a>(chain: &'a ChainTask, sequences: &[Option<&'a Progressive>], refit: Refit) -> Vec<Part<'a>> {
+    let hold_borders = chain.recipes.iter().any(|recipe| recipe.settings.lock_border);
     let part = |(task, sequence): (&'a PartTask, Option<&'a Progressive>)| Part {
         mesh: &task.mesh,
         sequence,
         shareable: task.shareable,
         refit,
+        hold_borders,
     };
-    tasks.iter().zip(sequences.iter().copied()).map(part).collect()
+    chain.parts.iter().zip(sequences.iter().copied()).map(part).collect()
 }
 
 /// Notes in every level what made it, where there was a choice.
