@@ -137,7 +137,8 @@ def cells(figures, levels):
         found = []
         for peer in PEERS:
             figure = figures.get(f"{peer} {ratio}", {})
-            if not figure.get("triangles") or not figure["d_rms"] or figure["triangles"] >= figures["source"]:
+            # A tool that gave up on the asset made no level.
+            if not figure.get("triangles") or not figure["d_rms"] or figure["triangles"] > 0.9 * figures["source"]:
                 continue
             triangles, own = min(levels, key=lambda level: abs(level[0] - figure["triangles"]))
             # Levels of few triangles cannot be closer than one contraction.
