@@ -96,7 +96,7 @@ def wanted_counts(figures, draft):
     counts = sorted({f["triangles"] for f in figures.values() if isinstance(f, dict) and f.get("triangles")}, reverse=True)
     kept = []
     for count in counts:
-        if count < figures["source"] and (not kept or abs(kept[-1] - count) > SAME / 2 * count):
+        if count <= 0.9 * figures["source"] and (not kept or abs(kept[-1] - count) > SAME / 2 * count):
             kept.append(count)
     return kept
 
