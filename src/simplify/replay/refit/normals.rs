@@ -138,7 +138,9 @@ impl System {
     fn solve(&self, now: [[f64; 3]; 3]) -> Option<[[f64; 3]; 3]> {
         let pull = self.area * PULL;
         let mut matrix = self.matrix;
-        [0, 3, 5].into_iter().for_each(|at| matrix[at] += pull);
+        for at in [0, 3, 5] {
+            matrix[at] += pull;
+        }
         let rows = (pull > 0.0).then(|| inverse(matrix)).flatten()?;
         let mut out = [[0.0; 3]; 3];
         for axis in 0..3 {

@@ -170,7 +170,9 @@ impl Surface<'_> {
         if pull <= 0.0 {
             return;
         }
-        [0, 3, 5].into_iter().for_each(|at| matrix[at] += pull);
+        for at in [0, 3, 5] {
+            matrix[at] += pull;
+        }
         let Some(rows) = inverse(matrix) else { return };
         let position = &mut self.positions[vertex as usize];
         let right = [0, 1, 2].map(|axis| right[axis] + pull * (start[axis] - position[axis]));
