@@ -5,11 +5,27 @@
 
 use crate::simplify::progressive::Progressive;
 
+/// The instances of one sub-mesh in a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instances {
+    /// How many there are, 1 or more.
+    pub count: usize,
+    /// The largest scale among their transforms, more than 0: by it an error of the sub-mesh is seen at most.
+    pub largest_scale: f64,
+}
+
+impl Default for Instances {
+    fn default() -> Self {
+        Self { count: 1, largest_scale: 1.0 }
+    }
+}
+
 /// The cuts of several sequences, for any number of triangles in sum.
 #[derive(Debug)]
 pub struct Allocation {
-    /// `(sequence, triangles that the step saves)`, cheapest first; steps of one sequence stay in their order.
-    order: Vec<(u32, u32)>,
+    /// `(sequence, triangles that the step saves in all its instances)`, cheapest first; steps of one sequence stay in their
+    /// order.
+    order: Vec<(u32, u64)>,
     triangles: usize,
     sequences: usize,
 }
@@ -17,12 +33,20 @@ pub struct Allocation {
 impl Allocation {
     /// Ranks all steps of `sequences` by cost. A step costs at least as much as those before it in its sequence.
     pub fn new(sequences: &[&Progressive]) -> Self {
-        let mut ranked: Vec<(f32, u32, u32, u32)> = Vec::new();
-        for (index, sequence) in sequences.iter().enumerate() {
+        Self::of_instances(&sequences.iter().map(|&s| (s, Instances::default())).collect::<Vec<_>>())
+    }
+
+    /// Ranks all steps of a scene's sequences as IAS does: the error of a step, which must be a length (metric `ias`, for each
+    /// triangle saved), grows with the largest scale among the instances, and what it saves with their number.
+    pub fn of_instances(sequences: &[(&Progressive, Instances)]) -> Self {
+        let mut ranked: Vec<(f64, u32, u32, u64)> = Vec::new();
+        for (index, (sequence, instances)) in sequences.iter().enumerate() {
+            let weight = instances.largest_scale / instances.count as f64;
             let (mut dearest, mut before) = (0.0f32, sequence.triangles);
             for (number, step) in sequence.steps.iter().enumerate() {
                 dearest = dearest.max(step.cost);
-                ranked.push((dearest, index as u32, number as u32, before - step.triangles));
+                let saves = u64::from(before - step.triangles) * instances.count as u64;
+                ranked.push((f64::from(dearest) * weight, index as u32, number as u32, saves));
                 before = step.triangles;
             }
         }
@@ -31,7 +55,7 @@ impl Allocation {
         }
         Self {
             order: ranked.into_iter().map(|(_, sequence, _, saves)| (sequence, saves)).collect(),
-            triangles: sequences.iter().map(|s| s.triangles as usize).sum(),
+            triangles: sequences.iter().map(|(s, instances)| s.triangles as usize * instances.count).sum(),
             sequences: sequences.len(),
         }
     }
@@ -86,6 +110,21 @@ mod tests {
         assert_eq!(all.cuts(7), [2, 1]);
         assert_eq!(all.cuts(2), [2, 3]);
         assert_eq!(all.cuts(0), [3, 3]);
+    }
+
+    #[test]
+    fn instances_weigh_by_their_scale_and_their_number() {
+        let (a, b) = (sequence(&[1.0, 2.0, 9.0]), sequence(&[3.0, 4.0, 5.0]));
+        let of = |count, largest_scale| Instances { count, largest_scale };
+        // Four times as many of the second: its steps cost a quarter for each triangle saved.
+        let many = Allocation::of_instances(&[(&a, of(1, 1.0)), (&b, of(4, 1.0))]);
+        assert_eq!(many.cuts(6 + 4 * 6), [0, 0]);
+        assert_eq!(many.cuts(6 + 4 * 4), [0, 1]);
+        assert_eq!(many.cuts(4), [1, 3]);
+        // Ten times as large: its errors are seen ten times as large, so it waits.
+        let large = Allocation::of_instances(&[(&a, of(1, 10.0)), (&b, of(1, 1.0))]);
+        assert_eq!(large.cuts(6), [0, 3]);
+        assert_eq!(large.cuts(4), [1, 3]);
     }
 
     #[test]

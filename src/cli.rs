@@ -10,7 +10,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use crate::command::failure::{Failure, UsageError};
 use crate::command::{
     CacheChoice, Context, Exit, bake, cache, check, completions, diff, evaluate, explain, init, inspect, report,
-    schema, study,
+    reproduce, schema, study,
 };
 use crate::progress::{JsonLines, Lines, Paint, Reporter, Terminal, Verbosity};
 
@@ -99,6 +99,8 @@ enum Command {
     Explain(explain::Explain),
     /// Compare ways to simplify: looks, distance, time and memory
     Study(study::Study),
+    /// Make the instanced-model paper's tables again
+    Reproduce(reproduce::Reproduce),
     /// Look after the cache
     Cache(cache::CacheCommand),
     /// Write the JSON schema of a file format to standard output
@@ -134,6 +136,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> Exit {
         Command::Explain(command) => command.run(&context),
         Command::Cache(command) => command.run(&context),
         Command::Study(command) => command.run(&context),
+        Command::Reproduce(command) => command.run(&context),
         Command::Measured(command) => command.run(&context),
         Command::StudyLevel(command) => command.run(&context),
         Command::Schema(command) => command.run(&context),

@@ -38,5 +38,6 @@ pub mod evaluation;
 pub mod page;
 pub mod publish;
 pub mod study;
+pub mod reproduction;
 pub mod command;
 pub mod cli;

@@ -115,6 +115,9 @@ pub struct ChainLevel {
     pub triangles: usize,
     /// Largest measured distance from the source of all parts, object space units.
     pub error: f64,
+    /// How far it is at most from the source in the sense of the metric's paper, if the metric says so; object space
+    /// units. What exactly it bounds stands at the metric.
+    pub bound: Option<f64>,
     /// Why it stopped there.
     pub stop: Stop,
     /// The recipe that made it, where several were tried.
@@ -182,6 +185,7 @@ pub fn chain(parts: &[Part], settings: &ChainSettings, judge: Option<Judge>) -> 
             triangles: left + fixed,
             parts: level_parts,
             error,
+            bound: sequences.iter().zip(&cuts).filter_map(|(s, &cut)| s.bound_after(cut)).reduce(f64::max),
             stop,
             recipe: None,
         });

@@ -262,8 +262,8 @@ fn recipe(settings: &SimplifySettings) -> Recipe {
 
 /// `its normal 0.018 texcoord 0.3`: what a report calls the winner.
 fn recipe_name(recipe: &SimplifySettings) -> String {
-    if recipe.metric == config::Metric::Qem {
-        return "qem".to_owned();
+    if recipe.metric != config::Metric::Its {
+        return recipe.metric.name().to_owned();
     }
     // The weights of the portfolio are products: six digits tell them apart and leave out the noise.
     let digits = |weight: f64| format!("{weight:.6}").trim_end_matches('0').trim_end_matches('.').to_owned();
@@ -277,16 +277,27 @@ fn placement(settings: &SimplifySettings) -> Placement {
     }
 }
 
-fn simplify_settings(settings: &SimplifySettings) -> Settings {
+/// What the simplifier is told.
+pub(crate) fn simplify_settings(settings: &SimplifySettings) -> Settings {
     let SimplifySettings { metric, effort, weights, placement: _, lock_border, candidates: _ } = settings;
+    // Metrics that do not see attributes carry them: by the scale they are rounded, which must not depend on what is not in
+    // their key.
+    let seen = if metric.sees_attributes() { *weights } else { config::Weights::default() };
     Settings {
         metric: match metric {
             // `recipes` has put others in the place of `auto`.
             config::Metric::Its | config::Metric::Auto => MetricKind::Its,
             config::Metric::Qem => MetricKind::Qem,
+            config::Metric::QemAttributes => MetricKind::QemAttributes,
+            config::Metric::Gaps => MetricKind::Gaps,
+            config::Metric::ItsPaper => MetricKind::ItsPaper,
+            config::Metric::Ias => MetricKind::Ias,
+            config::Metric::Aps => MetricKind::Aps,
+            config::Metric::Tmpm => MetricKind::Tmpm,
+            config::Metric::Naive => MetricKind::Naive,
         },
         placement: placement(settings),
-        attributes: AttributeScale { normal: weights.normal, texcoord: weights.texcoord, color: weights.color },
+        attributes: AttributeScale { normal: seen.normal, texcoord: seen.texcoord, color: seen.color },
         edges: EdgeWeights { border: weights.border, seam: weights.seam, crease: weights.crease },
         lock_border: *lock_border,
         memoryless: *effort != config::Effort::Fast,

@@ -15,6 +15,7 @@ pub mod init;
 pub mod inspect;
 mod recorded;
 pub mod report;
+pub mod reproduce;
 pub mod schema;
 pub mod study;
 

@@ -38,6 +38,22 @@ choice! {
         Its = "its",
         /// Quadric error of positions alone (Garland and Heckbert 1997); fastest, blind to textures.
         Qem = "qem",
+        /// One quadric over position and attributes together (Garland and Heckbert 1998).
+        QemAttributes = "qem-attributes",
+        /// Average distance and point clouds of attributes in one error; joins parts that no edge connects (Erikson and
+        /// Manocha 1999).
+        Gaps = "gaps",
+        /// The instanced-model paper's algorithm as it is written (Tariq et al. 2012): for comparing; `its` is better.
+        ItsPaper = "its-paper",
+        /// Distance for each triangle saved: positions alone, comparable between meshes (Azim et al. 2015).
+        Ias = "ias",
+        /// The least bound on how far a texture moves over the surface, which each level then states (Cohen et al. 1998).
+        Aps = "aps",
+        /// The least deviation of the texture first; charts keep their borders, vertices their places in the texture (Sander et
+        /// al. 2001).
+        Tmpm = "tmpm",
+        /// The shortest edge first, to its middle: the baseline of comparisons.
+        Naive = "naive",
         /// Several recipes are tried for each mesh, and each level is taken from the one that looks best.
         Auto = "auto",
     }

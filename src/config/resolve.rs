@@ -92,6 +92,7 @@ impl Layer {
             },
             placement: match storage {
                 Storage::Shared => Placement::Subset,
+                _ if !table.metric.unwrap_or_default().moves_vertices() => Placement::Subset,
                 _ => table.placement.unwrap_or_default(),
             },
             lock_border: table.lock_border.unwrap_or(false),
@@ -184,6 +185,13 @@ fn check_layer(document: &Document<'_>, place: &Place, layer: &Layer) -> Result<
     if layer.storage == Some(Storage::Shared) && layer.simplify.placement == Some(Placement::Optimal) {
         let place = place.key("simplify").key("placement");
         return Err(document.invalid(&place, "`optimal` moves vertices, so the levels cannot use storage `shared`"));
+    }
+    if let Some(metric) = layer.simplify.metric.filter(|metric| !metric.moves_vertices())
+        && layer.simplify.placement == Some(Placement::Optimal)
+    {
+        let place = place.key("simplify").key("placement");
+        let cause = format!("`optimal` is not for metric `{metric}`, which puts vertices onto one of the two ends");
+        return Err(document.invalid(&place, cause));
     }
     let place = place.key("lod");
     let entries = layer.lod.as_deref().unwrap_or_default();

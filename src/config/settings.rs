@@ -144,10 +144,22 @@ impl LevelTarget {
     }
 }
 
+impl Metric {
+    /// Whether the weights of normals, texture coordinates and colours count.
+    pub fn sees_attributes(self) -> bool {
+        matches!(self, Self::Its | Self::Auto | Self::QemAttributes | Self::Gaps | Self::ItsPaper)
+    }
+
+    /// Whether it can put a vertex anywhere but onto one of the ends.
+    pub fn moves_vertices(self) -> bool {
+        !matches!(self, Self::ItsPaper | Self::Tmpm)
+    }
+}
+
 impl SimplifySettings {
-    /// Whether rounds of re-weighting by pictures follow: metric `qem` has nothing to weight.
+    /// Whether rounds of re-weighting by pictures follow: the other metrics have nothing to weight.
     pub fn has_rounds(&self) -> bool {
-        self.effort == Effort::Best && self.metric != Metric::Qem
+        self.effort == Effort::Best && matches!(self.metric, Metric::Its | Metric::Auto)
     }
 
     /// Whether several recipes are tried.

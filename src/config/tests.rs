@@ -67,9 +67,19 @@ fn unknown_keys_name_the_nearest() {
 
 #[test]
 fn unknown_names_list_the_known() {
-    insta::assert_snapshot!(refused("\n[simplify]\nmetric = 'qme'"), @"unknown simplify.metric `qme` in `project/pipeline.toml` line 5 (did you mean `qem`? known: `its`, `qem`, `auto`)");
+    insta::assert_snapshot!(refused("\n[simplify]\nmetric = 'qme'"), @"unknown simplify.metric `qme` in `project/pipeline.toml` line 5 (did you mean `qem`? known: `its`, `qem`, `qem-attributes`, `gaps`, `its-paper`, `ias`, `aps`, `tmpm`, `naive`, `auto`)");
     insta::assert_snapshot!(refused("profile = 'blender'"), @"unknown profile `blender` in `project/pipeline.toml` line 3 (known: `web`, `core`, `unity`, `unreal`, `godot`, `babylon-stream`)");
     insta::assert_snapshot!(refused("[[override]]\nmatch = 'a'\nstorage = 'Shared'"), @"unknown override[0].storage `Shared` in `project/pipeline.toml` line 5 (did you mean `shared`? known: `smallest`, `compact`, `shared`)");
+}
+
+#[test]
+fn metrics_that_keep_to_source_vertices_refuse_to_move_them() {
+    insta::assert_snapshot!(refused("[simplify]\nmetric = 'its-paper'\nplacement = 'optimal'"), @"`project/pipeline.toml` line 5: simplify.placement `optimal` is not for metric `its-paper`, which puts vertices onto one of the two ends");
+    let settled = minimal("simplify.metric = 'its-paper'").unwrap().settings();
+    assert_eq!(settled.simplify.placement, Placement::Subset);
+    // Two layers that each are right: what the metric can do decides.
+    let over = "simplify.placement = 'optimal'\n[[override]]\nmatch = '*'\nsimplify.metric = 'tmpm'";
+    assert_eq!(minimal(over).unwrap().settings_for("a.glb").simplify.placement, Placement::Subset);
 }
 
 #[test]

@@ -80,22 +80,26 @@ fn write_simplify(settings: &SimplifySettings, parts: MeshParts, to: &mut dyn Ma
     let Weights { normal, texcoord, color, border, seam, crease } = *weights;
     to.text("metric", metric.name());
     to.text("effort", effort.name());
+    let sees_attributes = metric.sees_attributes();
+    let attributes =
+        [("normal", normal, parts.normals), ("texcoord", texcoord, parts.texcoords), ("color", color, parts.colors)];
+    for (name, weight, _) in attributes.into_iter().filter(|(.., present)| sees_attributes && *present) {
+        to.number(name, weight);
+    }
     match metric {
         Metric::Its | Metric::Auto => {
-            let attributes = [
-                ("normal", normal, parts.normals),
-                ("texcoord", texcoord, parts.texcoords),
-                ("color", color, parts.colors),
-            ];
-            for (name, weight, _) in attributes.into_iter().filter(|(.., present)| *present) {
-                to.number(name, weight);
-            }
             to.number("border", border);
             to.number("seam", seam);
             to.number("crease", crease);
         }
-        // Sees positions alone.
-        Metric::Qem => to.number("border", border),
+        Metric::QemAttributes => {
+            to.number("border", border);
+            to.number("seam", seam);
+        }
+        // One weight for both.
+        Metric::Qem | Metric::Gaps | Metric::ItsPaper | Metric::Ias | Metric::Aps => to.number("border", border),
+        // See lengths and textures alone.
+        Metric::Naive | Metric::Tmpm => {}
     }
     if *metric == Metric::Auto {
         to.integer("candidates", (*candidates).into());

@@ -16,7 +16,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 pub use jobs::{MeshParts, SequenceJob, write_chain};
 
 /// Encoding of cached results. Raise it when old bytes can no longer be read.
-pub const FORMAT_VERSION: u32 = 2;
+pub const FORMAT_VERSION: u32 = 3;
 
 /// Simplification and levels. Raise it in the commit that changes any bytes for the same mesh and settings.
 pub const ALGORITHM_VERSION: u32 = 5;

@@ -418,6 +418,11 @@ impl Topology {
         self.first_wedge[kept as usize] = head;
     }
 
+    /// Whether two wedges differ in their normals at most, or were joined with such.
+    pub fn same_chart(&self, a: u32, b: u32) -> bool {
+        a == b || self.chart_of(a) == self.chart_of(b)
+    }
+
     fn chart_of(&self, wedge: u32) -> u32 {
         let mut chart = self.chart[wedge as usize];
         while self.chart[chart as usize] != chart {
@@ -508,8 +513,7 @@ impl Topology {
         if a == c && b == d {
             return EdgeKind::Interior;
         }
-        let same_chart = |x: u32, y: u32| x == y || self.chart_of(x) == self.chart_of(y);
-        if same_chart(a, c) && same_chart(b, d) { EdgeKind::Crease } else { EdgeKind::Seam }
+        if self.same_chart(a, c) && self.same_chart(b, d) { EdgeKind::Crease } else { EdgeKind::Seam }
     }
 }
 

@@ -3,8 +3,19 @@
 //! A metric reads the surface, keeps state of its own and writes the wedge values of a merged vertex. It never
 //! changes topology, and it does not know in which order pairs are taken.
 
+pub mod aps;
+mod clouds;
+mod domain;
+pub mod gaps;
+pub mod ias;
 pub mod its;
+pub mod its_paper;
+pub mod naive;
+mod overlay;
+mod parts;
 pub mod qem;
+pub mod qem_attributes;
+pub mod tmpm;
 
 use serde::{Deserialize, Serialize};
 
@@ -30,8 +41,26 @@ pub struct Price {
     pub keep_second: bool,
 }
 
+/// What the costs of a metric are, in the unit frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CostUnit {
+    /// Squared distances times areas: the fourth power of a length.
+    SquareTimesArea,
+    /// A length.
+    Length,
+}
+
 /// Prices contractions and follows them.
 pub trait ErrorMetric {
+    /// What its costs are.
+    const COST: CostUnit = CostUnit::SquareTimesArea;
+
+    /// A refusal may end when anything beside the pair changes: the pair is tried again then, as illegal ones are.
+    const REFUSES_FOR_NOW: bool = false;
+
+    /// Parts that no edge connects may be joined: the driver offers pairs that are near each other.
+    const JOINS: bool = false;
+
     /// The pair `a`, `b` is about to be priced for good: brings up to date what was put off.
     fn prepare(&mut self, _surface: &Topology, _a: u32, _b: u32) {}
 
@@ -45,7 +74,22 @@ pub trait ErrorMetric {
     /// What contracting them costs if the vertex must go to `position`; `None` = refused.
     fn price_at(&self, surface: &Topology, a: u32, b: u32, position: [f64; 3]) -> Option<Price>;
 
+    /// The contraction is about to be done: notes what the surface will no longer tell.
+    fn contracting(&mut self, _surface: &Topology, _kept: u32, _gone: u32, _price: &Price) {}
+
+    /// How far the surface is at most from the source after the last contraction, unit frame, in the sense of the metric's
+    /// paper; `None` = the metric makes no such statement. Never falls.
+    fn bound(&self) -> Option<f64> {
+        None
+    }
+
     /// The contraction has been done in `surface`: set the values of the wedges of the vertex that stays, and fold
     /// the state.
     fn contracted(&mut self, surface: &mut Topology, done: &Contraction);
+}
+
+/// A metric that knows how far a pair would move the surface before it looks at attributes.
+pub trait Staged: ErrorMetric {
+    /// The geometric error alone, a length in the unit frame; `None` = refused.
+    fn geometric_error(&self, surface: &Topology, a: u32, b: u32) -> Option<f64>;
 }

@@ -3,12 +3,14 @@
 //! Generic over the metric and never knows which one it runs. Single-threaded and deterministic: ties go by vertex
 //! number. One run makes the whole sequence; every level is a cut of it ([`progressive`]).
 
+mod joins;
 mod legal;
 pub mod progressive;
 pub mod replay;
 mod queue;
 #[cfg(test)]
 mod tests;
+mod threshold;
 
 use serde::{Deserialize, Serialize};
 
@@ -16,10 +18,18 @@ use crate::mesh::Mesh;
 use crate::mesh::layout::{AttributeScale, Layout};
 use crate::mesh::topology::{self, Contraction, EdgeKind, NEXT, Topology};
 use crate::mesh::visible::visible;
+use crate::metric::aps::Aps;
+use crate::metric::gaps::Gaps;
+use crate::metric::ias::Ias;
 use crate::metric::its::{EdgeWeights, Its};
+use crate::metric::its_paper::ItsPaper;
+use crate::metric::naive::Naive;
 use crate::metric::qem::Qem;
-use crate::metric::{ErrorMetric, Placement, Price};
+use crate::metric::qem_attributes::QemAttributes;
+use crate::metric::tmpm::Tmpm;
+use crate::metric::{CostUnit, ErrorMetric, Placement, Price};
 use crate::quadric::{cross, dot, lerp, sub};
+use joins::Joins;
 use progressive::{Progressive, Recorder};
 use queue::{Entry, Queue};
 
@@ -30,11 +40,40 @@ pub enum MetricKind {
     Its,
     /// [`crate::metric::qem`]
     Qem,
+    /// [`crate::metric::qem_attributes`]
+    QemAttributes,
+    /// [`crate::metric::naive`]
+    Naive,
+    /// [`crate::metric::gaps`]
+    Gaps,
+    /// [`crate::metric::its_paper`]
+    ItsPaper,
+    /// [`crate::metric::ias`]
+    Ias,
+    /// [`crate::metric::aps`]
+    Aps,
+    /// [`crate::metric::tmpm`]
+    Tmpm,
 }
 
 impl MetricKind {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Its, Self::Qem];
+    pub const ALL: [Self; 9] = [
+        Self::Its,
+        Self::Qem,
+        Self::QemAttributes,
+        Self::Naive,
+        Self::Gaps,
+        Self::ItsPaper,
+        Self::Ias,
+        Self::Aps,
+        Self::Tmpm,
+    ];
+
+    /// Whether it can put merged vertices there. All can put them onto one of the ends.
+    pub fn can_place(self, placement: Placement) -> bool {
+        placement == Placement::Subset || !matches!(self, Self::ItsPaper | Self::Tmpm)
+    }
 }
 
 /// Everything that decides the sequence, besides the mesh.
@@ -91,8 +130,25 @@ fn build(
     recorder: Recorder,
 ) -> Progressive {
     let Settings { edges, placement, memoryless, .. } = *settings;
+    let (layout, primitives) = (recorder.layout(), recorder.wedge_primitive());
     match settings.metric {
         MetricKind::Qem => run(surface, Qem::new(surface, edges.border, placement), locks, recorder),
+        MetricKind::QemAttributes => run(surface, QemAttributes::new(surface, edges, placement), locks, recorder),
+        MetricKind::Naive => run(surface, Naive::new(placement), locks, recorder),
+        MetricKind::Gaps => {
+            let metric = Gaps::new(surface, layout, primitives, edges.border, placement);
+            run(surface, metric, locks, recorder)
+        }
+        MetricKind::ItsPaper => {
+            let metric = ItsPaper::new(surface, layout, primitives, edges.border);
+            threshold::run(surface, metric, locks, recorder)
+        }
+        MetricKind::Aps => {
+            let metric = Aps::new(surface, layout, primitives, edges.border, placement);
+            run(surface, metric, locks, recorder)
+        }
+        MetricKind::Tmpm => run(surface, Tmpm::new(surface, layout, primitives), locks, recorder),
+        MetricKind::Ias => run(surface, Ias::new(surface, edges.border, placement), locks, recorder),
         MetricKind::Its => {
             let metric = Its::new(surface, edges, placement, memoryless, importance);
             run(surface, metric, locks, recorder)
@@ -137,8 +193,19 @@ impl Locks {
     }
 }
 
-fn run<E: ErrorMetric>(surface: &mut Topology, metric: E, locks: &Locks, recorder: Recorder) -> Progressive {
-    let mut driver = Driver { queue: Queue::new(), recorder, done: Contraction::default(), surface, metric, locks };
+fn run<E: ErrorMetric>(surface: &mut Topology, metric: E, locks: &Locks, mut recorder: Recorder) -> Progressive {
+    recorder.costs_are(E::COST);
+    let joins = Joins::new(surface.positions.len(), E::JOINS);
+    let mut driver = Driver {
+        waiting: Vec::new(),
+        queue: Queue::new(),
+        joins,
+        recorder,
+        done: Contraction::default(),
+        surface,
+        metric,
+        locks,
+    };
     driver.fill();
     driver.run();
     driver.recorder.finish()
@@ -150,6 +217,10 @@ struct Driver<'a, E> {
     metric: E,
     locks: &'a Locks,
     queue: Queue,
+    /// Pairs without an edge, for metrics that join parts.
+    joins: Joins,
+    /// Ends of pairs without a price, for metrics that refuse for now.
+    waiting: Vec<u32>,
     recorder: Recorder,
     done: Contraction,
 }
@@ -163,8 +234,18 @@ const AHEAD: usize = 8;
 impl<E: ErrorMetric> Driver<'_, E> {
     fn price(&self, a: u32, b: u32) -> Option<Price> {
         let mut price = self.locks.price(&self.metric, self.surface, a, b)?;
-        price.cost += vanishing(self.surface, a, b);
+        price.cost += self.vanishing(a, b);
         Some(price)
+    }
+
+    /// [`vanishing`] in the metric's unit.
+    #[inline]
+    fn vanishing(&self, a: u32, b: u32) -> f64 {
+        let cost = vanishing(self.surface, a, b);
+        match E::COST {
+            CostUnit::SquareTimesArea => cost,
+            CostUnit::Length => cost.sqrt().sqrt(),
+        }
     }
 
     /// Enters every pair.
@@ -175,6 +256,8 @@ impl<E: ErrorMetric> Driver<'_, E> {
             for &b in neighbours.iter().filter(|&&b| a < b) {
                 if let Some(price) = self.locks.price(&self.metric, self.surface, a, b) {
                     self.queue.push(a, b, price.cost, 0);
+                } else if E::REFUSES_FOR_NOW {
+                    self.waiting.extend([a, b]);
                 }
             }
         }
@@ -182,9 +265,10 @@ impl<E: ErrorMetric> Driver<'_, E> {
 
     fn contract(&mut self, a: u32, b: u32, price: &Price) -> [u32; 2] {
         let (kept, gone) = if price.keep_second { (b, a) } else { (a, b) };
+        self.metric.contracting(self.surface, kept, gone, price);
         self.surface.contract(kept, gone, price.position, &mut self.done);
         self.metric.contracted(self.surface, &self.done);
-        self.recorder.record(self.surface, &self.done, price);
+        self.recorder.record(self.surface, &self.done, price, self.metric.bound());
         [kept, gone]
     }
 
@@ -198,7 +282,7 @@ impl<E: ErrorMetric> Driver<'_, E> {
         let mut refused = vec![false; vertices];
         let (mut neighbours, mut second) = (Vec::new(), Vec::new());
         let mut until_touch = 0;
-        while let Some(Entry { a, b, tag }) = self.queue.pop() {
+        while let Some(Entry { a, b, tag }) = self.next(&stamps) {
             if until_touch == 0 {
                 self.touch_ahead(&stamps);
                 until_touch = AHEAD;
@@ -209,7 +293,12 @@ impl<E: ErrorMetric> Driver<'_, E> {
                 continue;
             }
             self.metric.prepare(self.surface, a, b);
-            let Some(price) = self.price(a, b) else { continue };
+            let Some(price) = self.price(a, b) else {
+                if E::REFUSES_FOR_NOW {
+                    (refused[a as usize], refused[b as usize]) = (true, true);
+                }
+                continue;
+            };
             if !self.queue.is_due(price.cost) {
                 self.queue.push(a, b, price.cost, tag);
                 continue;
@@ -223,10 +312,16 @@ impl<E: ErrorMetric> Driver<'_, E> {
                 self.queue.push(a, b, price.cost, tag);
                 continue;
             }
+            if E::REFUSES_FOR_NOW {
+                self.waiting.drain(..).for_each(|vertex| refused[vertex as usize] = true);
+            }
             let [kept, gone] = self.contract(a, b, &price);
             stamps[gone as usize] = GONE;
             stamps[kept as usize] += 1;
             self.surface.neighbours(kept, &mut neighbours);
+            if E::JOINS {
+                self.joins.merged(kept, gone, self.surface, &mut neighbours);
+            }
             self.push_all(&stamps, kept, &neighbours);
             for &vertex in &neighbours {
                 if std::mem::take(&mut refused[vertex as usize]) {
@@ -235,6 +330,21 @@ impl<E: ErrorMetric> Driver<'_, E> {
                 }
             }
         }
+    }
+
+    /// The next pair. Where everything left costs more than the threshold, parts within twice of it may be joined.
+    #[inline]
+    fn next(&mut self, stamps: &[u32]) -> Option<Entry> {
+        if E::JOINS {
+            while let Some(limit) = self.joins.limit()
+                && self.queue.is_above(limit)
+            {
+                for [a, b] in self.joins.widen(self.surface) {
+                    self.push_all(stamps, a, &[b]);
+                }
+            }
+        }
+        self.queue.pop()
     }
 
     /// Reads what the next pairs need, all at once.
@@ -252,6 +362,8 @@ impl<E: ErrorMetric> Driver<'_, E> {
             if let Some(price) = self.locks.price(&self.metric, self.surface, vertex, other) {
                 let tag = stamps[vertex as usize].wrapping_add(stamps[other as usize]);
                 self.queue.push(vertex, other, price.cost, tag);
+            } else if E::REFUSES_FOR_NOW {
+                self.waiting.extend([vertex, other]);
             }
         }
     }
@@ -270,7 +382,7 @@ impl<E: ErrorMetric> Driver<'_, E> {
             return None;
         }
         let mut price = self.metric.price_at(surface, a, b, middle)?;
-        price.cost += vanishing(surface, a, b);
+        price.cost += self.vanishing(a, b);
         Some(price)
     }
 }

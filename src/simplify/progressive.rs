@@ -9,7 +9,7 @@ use crate::mesh::Mesh;
 use crate::mesh::layout::Layout;
 use crate::mesh::topology::{Contraction, Place, Topology};
 use crate::mesh::weld::Weld;
-use crate::metric::Price;
+use crate::metric::{CostUnit, Price};
 
 /// The sequence. Positions are in object space, wedge values unscaled (as they will be written).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -30,6 +30,9 @@ pub struct Progressive {
     pub set_wedges: Vec<u32>,
     /// Their values, `columns` each.
     pub set_values: Vec<f32>,
+    /// How far the surface is at most from the source after each step, in the sense of the metric's paper, object space;
+    /// empty where the metric makes no such statement.
+    pub bounds: Vec<f32>,
 }
 
 /// One contraction.
@@ -43,7 +46,8 @@ pub struct Step {
     pub position: [f32; 3],
     /// Where that lies along the edge, 0 at `kept` … 1 at `gone`: passive attributes follow.
     pub t: f32,
-    /// Cost in units of the object: comparable between sub-meshes of one run of the same metric.
+    /// Cost in units of the object (a length, or its fourth power: [`CostUnit`]): comparable between sub-meshes of one run
+    /// of the same metric.
     pub cost: f32,
     /// Triangles left after this step.
     pub triangles: u32,
@@ -67,6 +71,14 @@ impl Progressive {
     /// Triangles left after the first `steps`.
     pub fn triangles_after(&self, steps: usize) -> usize {
         steps.checked_sub(1).map_or(self.triangles, |last| self.steps[last].triangles) as usize
+    }
+
+    /// How far the surface is at most from the source after the first `steps`, if the metric says so; object space.
+    pub fn bound_after(&self, steps: usize) -> Option<f64> {
+        match steps.checked_sub(1) {
+            None => (!self.bounds.is_empty()).then_some(0.0),
+            Some(last) => self.bounds.get(last).map(|&bound| f64::from(bound)),
+        }
     }
 }
 
@@ -108,9 +120,8 @@ impl Recorder {
             merges: Vec::with_capacity(surface.wedge_vertex.len()),
             set_wedges: Vec::with_capacity(surface.wedge_vertex.len()),
             set_values: Vec::with_capacity(surface.values.len()),
+            bounds: Vec::new(),
         };
-        // Area times squared distance: the fourth power of the unit.
-        let squared = layout.radius * layout.radius;
         let mut positions = vec![[0.0; 3]; weld.vertices];
         for (wedge, &vertex) in weld.wedge_vertex.iter().enumerate() {
             let primitive = &mesh.primitives[weld.wedge_primitive[wedge] as usize];
@@ -122,13 +133,35 @@ impl Recorder {
             wedge_primitive: weld.wedge_primitive,
             unscale,
             columns: layout.columns,
-            cost_scale: squared * squared,
+            cost_scale: 1.0,
             positions,
         }
     }
 
-    /// Adds a contraction that has been done, with its wedge values set.
-    pub fn record(&mut self, surface: &Topology, done: &Contraction, price: &Price) {
+    /// What the values are that are recorded.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Primitive of each wedge.
+    pub fn wedge_primitive(&self) -> &[u32] {
+        &self.wedge_primitive
+    }
+
+    /// Says what the costs are that follow.
+    pub fn costs_are(&mut self, unit: CostUnit) {
+        let squared = self.layout.radius * self.layout.radius;
+        self.cost_scale = match unit {
+            CostUnit::SquareTimesArea => squared * squared,
+            CostUnit::Length => self.layout.radius,
+        };
+    }
+
+    /// Adds a contraction that has been done, with its wedge values set, and the metric's bound if it has one.
+    pub fn record(&mut self, surface: &Topology, done: &Contraction, price: &Price, bound: Option<f64>) {
+        if let Some(bound) = bound {
+            self.out.bounds.push(above(bound * self.layout.radius));
+        }
         self.out.merges.extend_from_slice(&done.merged);
         for wedge in surface.wedges(done.kept) {
             self.out.set_wedges.push(wedge);
@@ -158,4 +191,10 @@ impl Recorder {
     pub fn finish(self) -> Progressive {
         self.out
     }
+}
+
+/// The least `f32` that is not below `x`.
+fn above(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) < x { near.next_up() } else { near }
 }

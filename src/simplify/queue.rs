@@ -77,6 +77,19 @@ impl Queue {
         &bin.entries[bin.done..(bin.done + count).min(bin.entries.len())]
     }
 
+    /// Whether all pairs cost more than that, or there are none.
+    pub fn is_above(&mut self, cost: f64) -> bool {
+        let limit = bin(cost);
+        while self.open + 1 < self.bins.len() && self.bins[self.open].done == self.bins[self.open].entries.len() {
+            if limit < self.open {
+                return true;
+            }
+            self.bins[self.open] = Bin::default();
+            self.open += 1;
+        }
+        limit < self.open
+    }
+
     /// Whether a pair of that cost need not wait.
     #[inline]
     pub fn is_due(&self, cost: f64) -> bool {

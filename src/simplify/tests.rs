@@ -21,8 +21,14 @@ const BALANCED: Settings = Settings {
 fn all_settings() -> impl Iterator<Item = Settings> {
     MetricKind::ALL.into_iter().flat_map(|metric| {
         let places = [(Placement::Optimal, true), (Placement::Optimal, false), (Placement::Subset, true)];
-        places.map(|(placement, memoryless)| Settings { metric, placement, memoryless, ..BALANCED })
+        let settings = places.map(|(placement, memoryless)| Settings { metric, placement, memoryless, ..BALANCED });
+        settings.into_iter().filter(move |settings| metric.can_place(settings.placement))
     })
+}
+
+/// Metrics whose price knows the outline: `naive` knows lengths alone, `its-paper` asks for the length first.
+fn knows_outlines(settings: &Settings) -> bool {
+    !matches!(settings.metric, MetricKind::Naive | MetricKind::ItsPaper)
 }
 
 fn attribute(name: &str, components: usize, values: Vec<f32>) -> Attribute {
@@ -83,7 +89,7 @@ fn area(t: &[[f32; 3]; 3]) -> f64 {
 #[test]
 fn a_flat_grid_becomes_two_triangles_and_keeps_its_outline() {
     let mesh = one(grid(12, 9, |u, v| ([u * 4.0, v * 3.0, 0.0], [u, v])));
-    for settings in all_settings() {
+    for settings in all_settings().filter(knows_outlines) {
         let sequence = simplify(&mesh, &settings);
         let steps = sequence.cut_at(2);
         let left = triangles(&mesh, &sequence, steps);
@@ -248,13 +254,14 @@ proptest! {
     fn any_soup_is_simplified_to_what_the_record_says(
         points in prop::collection::vec(prop::array::uniform3(-4i8..4), 3..24),
         corners in prop::collection::vec(0usize..1000, 3..90),
-        which in 0usize..6,
+        which in 0usize..1000,
     ) {
         let count = points.len();
         let positions: Vec<f32> = points.iter().flatten().map(|&x| f32::from(x)).collect();
         let indices: Vec<u32> = corners.chunks_exact(3).flatten().map(|&i| (i % count) as u32).collect();
         let mesh = one(Primitive { count, attributes: vec![attribute("POSITION", 3, positions)], targets: Vec::new(), indices });
-        let settings = all_settings().nth(which).expect("six settings");
+        let all: Vec<Settings> = all_settings().collect();
+        let settings = all[which % all.len()];
         let sequence = simplify(&mesh, &settings);
         for steps in [0, sequence.steps.len() / 2, sequence.steps.len()] {
             let left = triangles(&mesh, &sequence, steps);

@@ -88,7 +88,8 @@ fn levels_of(file: &Path, scene: &Scene, settings: &SceneSettings) -> Result<Vec
                         primitives[index] = PrimitiveLevel::Level(Arc::new(primitive.clone()));
                     }
                 }
-                MeshLevel { primitives, error: level.error, facts: None }
+                let facts = level.bound.map(|bound| serde_json::json!({ "bound": bound }));
+                MeshLevel { primitives, error: level.error, facts }
             })
             .collect();
         if !levels.is_empty() {

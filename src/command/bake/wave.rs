@@ -480,7 +480,8 @@ fn levels(scene: &ReadScene, chains: &BTreeMap<JobKey, Arc<Chain>>) -> Vec<MeshL
                     primitives[index] = PrimitiveLevel::Level(in_source(source, index, primitive));
                 }
             }
-            MeshLevel { primitives, error: level.error, facts: None }
+            let facts = level.bound.map(|bound| serde_json::json!({ "bound": bound }));
+            MeshLevel { primitives, error: level.error, facts }
         });
         out.push(MeshLevels { mesh: source.index, radius: scene.radii[source.index], levels: levels.collect() });
     }
