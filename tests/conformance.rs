@@ -435,6 +435,63 @@ fn the_true_deviation_of_a_texture_never_exceeds_the_bound() {
     }
 }
 
+/// A dome over a round chart, whose border turns by 7.5° at each vertex.
+fn dome() -> Mesh {
+    use std::f32::consts::TAU;
+    let (sides, rings) = (48u32, 12u32);
+    let at = |x: f32, y: f32| ([x, y, (1.0 - x * x - y * y).max(0.0) * 0.5], [0.5 + x * 0.5, 0.5 + y * 0.5]);
+    let mut rows = vec![at(0.0, 0.0)];
+    let mut indices = Vec::new();
+    for ring in 1..=rings {
+        for side in 0..sides {
+            let (r, a) = (ring as f32 / rings as f32, side as f32 / sides as f32 * TAU);
+            rows.push(at(r * a.cos(), r * a.sin()));
+            let (here, next) = ((ring - 1) * sides + side + 1, (ring - 1) * sides + (side + 1) % sides + 1);
+            if ring == 1 {
+                indices.extend([0, here, next]);
+            } else {
+                indices.extend([here - sides, here, next, here - sides, next, next - sides]);
+            }
+        }
+    }
+    let attributes = vec![
+        attribute("POSITION", 3, rows.iter().flat_map(|row| row.0).collect()),
+        attribute("TEXCOORD_0", 2, rows.iter().flat_map(|row| row.1).collect()),
+    ];
+    one(Primitive { count: rows.len(), attributes, targets: Vec::new(), indices })
+}
+
+/// `aps` and `tmpm` work within the texture: what they leave covers what the source covered, the same way round.
+#[test]
+fn charts_keep_their_outline_and_no_triangle_turns_over_in_the_texture() {
+    let areas = |mesh: &Mesh, sequence: &Progressive, steps: usize| -> Vec<f64> {
+        let cut = Cut::new(mesh, sequence, steps);
+        let mut out = Vec::new();
+        for (cut, own) in &cut.primitives {
+            let uv = own.attributes.iter().find(|a| a.name == "TEXCOORD_0").expect("it is textured");
+            let at = |i: u32| [0, 1].map(|k| f64::from(uv.values[i as usize * 2 + k]));
+            out.extend(cut.indices.chunks_exact(3).map(|t| {
+                let (a, b, c) = (at(t[0]), at(t[1]), at(t[2]));
+                ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])) / 2.0
+            }));
+        }
+        out
+    };
+    for (name, mesh) in [("dome", dome()), ("torus", torus(24, 16)), ("materials", two_materials())] {
+        for settings in all_settings().filter(|s| matches!(s.metric, MetricKind::Aps | MetricKind::Tmpm)) {
+            let sequence = simplify(&mesh, &settings);
+            let source: f64 = areas(&mesh, &sequence, 0).iter().sum();
+            for steps in steps(&sequence) {
+                let left = areas(&mesh, &sequence, steps);
+                assert!(left.iter().all(|&area| 0.0 < area), "{name}, {settings:?}: turned over");
+                let sum: f64 = left.iter().sum();
+                assert!((sum - source).abs() < 2e-3 * source, "{name}, {settings:?}: {sum} of {source}");
+            }
+            assert!(sequence.triangles_after(sequence.steps.len()) < mesh.triangles() / 4, "{name}, {settings:?}");
+        }
+    }
+}
+
 /// Quadrics must beat the baseline: the thesis measures up to half the error (section 2.1).
 #[test]
 fn quadrics_err_less_than_the_naive_scheme() {

@@ -246,6 +246,21 @@ fn degenerate_input_is_survived() {
     }
 }
 
+#[test]
+fn edges_that_lost_their_last_face_are_pairs_no_more() {
+    // A ball whose poles are many stored vertices at one place: faces vanish two at a time, borders come and go.
+    use std::f32::consts::PI;
+    let mesh = one(grid(20, 12, |u, v| {
+        let (a, b) = (u * 2.0 * PI, v * PI);
+        ([b.sin() * a.cos(), b.cos(), b.sin() * a.sin()], [u, v])
+    }));
+    for settings in all_settings() {
+        let sequence = simplify(&mesh, &settings);
+        let mut gone = std::collections::BTreeSet::new();
+        assert!(sequence.steps.iter().all(|step| gone.insert(step.gone) && !gone.contains(&step.kept)), "{settings:?}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 

@@ -3,10 +3,10 @@
 //! ITS paper, Algorithm 1 and section 3.2: pairs are the edges shorter than the threshold; none left, it doubles; more than
 //! ten, it halves; the least error of those pairs is contracted.
 //!
-//! Where the paper leaves gaps: the threshold starts at a thousandth of the radius; it does not halve where nothing would be
-//! left, and then the ten shortest edges are looked at (a regular grid has thousands of one length); a pair whose geometric
-//! error exceeds the threshold is not valid either; pairs that may not be contracted are left out until something beside
-//! them changes.
+//! Where the paper leaves gaps: the threshold starts at a thousandth of the radius; it does not halve where no edge would be
+//! left; a pair whose geometric error exceeds the threshold is not valid either; of the valid pairs eleven are compared, among
+//! the 32 shortest edges (a regular grid has thousands of one length); pairs that may not be contracted are left out until
+//! something beside them changes.
 
 use std::collections::BTreeSet;
 
@@ -25,8 +25,8 @@ const LAST: f64 = 4.0;
 /// More valid pairs than this halve the threshold.
 const MOST: usize = 10;
 
-/// Edges that are taken from the set at once.
-const BATCH: usize = 64;
+/// Edges that are looked at for one contraction, the shortest.
+const BATCH: usize = 32;
 
 /// An edge by its length. Lengths are not negative, so their bits order as they do.
 type Edge = (u64, u32, u32);
@@ -96,39 +96,38 @@ impl<E: Staged> Run<'_, E> {
 
     /// The next pair to contract. Those that may not be are taken out on the way.
     fn next(&mut self, refused: &mut [bool]) -> Option<(u32, u32, Price)> {
-        while MOST < self.shorter(self.threshold, MOST + 1).len() && !self.shorter(self.threshold / 2.0, 1).is_empty() {
-            self.threshold /= 2.0;
-        }
         loop {
             let mut best: Option<(f64, u32, u32, Price)> = None;
-            let mut waiting = 0;
+            let (mut valid, mut out) = (0, 0);
             let edges = self.shorter(self.threshold, BATCH);
-            let more = edges.len() == BATCH;
-            for (_, a, b) in edges {
+            let looked_at = edges.len();
+            for (length, a, b) in edges {
                 match self.stage(a, b) {
                     Stage::Never => {
-                        let edge = self.edge(a, b);
-                        self.edges.remove(&edge);
+                        self.edges.remove(&(length, a, b));
                         (refused[a as usize], refused[b as usize]) = (true, true);
-                        continue;
+                        out += 1;
                     }
                     Stage::OverLimit => {}
                     Stage::Valid(price) => {
+                        valid += 1;
                         if best.as_ref().is_none_or(|(cost, ..)| price.cost < *cost) {
                             best = Some((price.cost, a, b, price));
                         }
+                        if MOST < valid {
+                            break;
+                        }
                     }
                 }
-                waiting += 1;
-                if waiting == MOST && (best.is_some() || self.threshold <= LAST) {
-                    break;
-                }
+            }
+            if MOST < valid && !self.shorter(self.threshold / 2.0, 1).is_empty() {
+                self.threshold /= 2.0;
             }
             if let Some((_, a, b, price)) = best {
                 return Some((a, b, price));
             }
-            if more && waiting < MOST {
-                // Nearly all of them could not be contracted, and are out.
+            if looked_at == BATCH && 0 < out {
+                // Others come up behind those that are out.
                 continue;
             }
             if self.threshold > LAST {
@@ -140,6 +139,10 @@ impl<E: Staged> Run<'_, E> {
 
     /// The geometric error first: of a pair beyond the limit no attribute is looked at.
     fn stage(&self, a: u32, b: u32) -> Stage {
+        if !self.surface.are_joined(a, b) {
+            // The last face on it is gone, or one of its ends.
+            return Stage::Never;
+        }
         let Some(geometric) = self.metric.geometric_error(self.surface, a, b) else { return Stage::Never };
         if geometric > self.threshold && self.threshold <= LAST {
             return Stage::OverLimit;
