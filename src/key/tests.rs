@@ -155,9 +155,9 @@ fn what_is_not_used_is_not_in_the_key() {
 #[test]
 fn the_key_is_the_same_on_every_machine() {
     let [sequence, chain, scene] = keys(&settings(""), MeshParts::ALL);
-    insta::assert_snapshot!(sequence, @"f00baf4b76a04c7a5cd2a4959266c06862bcb363576ef96100e97c408eaa2b2c");
-    insta::assert_snapshot!(chain, @"67c288a9c11f153b5f5dc80bed28db7dca5f695b794f8536050325cee0b6c7a0");
-    insta::assert_snapshot!(scene, @"380915146f8a1eb4577c0f78c2d384cc4677db49edd31a50667b904ce821930c");
+    insta::assert_snapshot!(sequence, @"c89527a5a721801ba40b3304c6cfa759cf8275cb97b9e04d66fcb0d1af85fc58");
+    insta::assert_snapshot!(chain, @"8154710ea80a4c38607285c28bb3a6903375310c4b4d983a4aec2dd7126e73e4");
+    insta::assert_snapshot!(scene, @"a5ad8b0876a9f07afec7381b7370744b3bc2df095abfb05c7d1d0b11792dd386");
     assert_eq!(sequence.to_string().parse(), Ok(sequence));
     assert!("x".parse::<JobKey>().is_err());
 }
