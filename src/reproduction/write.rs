@@ -61,11 +61,6 @@ pub fn obj(mesh: &Primitive, copies: &[Copy]) -> String {
     out
 }
 
-/// Number of instances that an OBJ of the second dialect names.
-pub fn instances(text: &str) -> usize {
-    text.lines().filter(|line| line.starts_with(INSTANCE)).count()
-}
-
 /// A GLB of one primitive: a node for each copy, or one node if there are none.
 pub fn glb(mesh: &Primitive, copies: &[Copy]) -> Result<Vec<u8>, DocumentError> {
     let mut document = Document::new(Container::Glb, concat!("lodbake ", env!("CARGO_PKG_VERSION")));
