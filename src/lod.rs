@@ -312,7 +312,7 @@ impl<'a> Cutter<'a> {
             let error = if cut.iter().all(|c| c.indices.is_empty()) {
                 f64::INFINITY
             } else {
-                self.source.deviation(&mut replay, &cut)
+                self.source.deviation(&replay, &cut)
             };
             if error <= limit {
                 within = middle;
@@ -348,7 +348,7 @@ impl<'a> Cutter<'a> {
         let sources = &self.part.mesh.primitives;
         let error = match finish {
             Finish::Draft => 0.0,
-            Finish::Whole => self.source.deviation(&mut self.replay, &cuts),
+            Finish::Whole => self.source.deviation(&self.replay, &cuts),
         };
         let primitive = |(index, cut)| self.primitive(index, &sources[index], cut, finish);
         let primitives = cuts.into_iter().enumerate().map(primitive).collect();
@@ -431,25 +431,27 @@ impl<'a> Source<'a> {
 
     /// Largest distance between source and level: from source vertices to the level, and from the level's corners and
     /// middles of triangles to the source.
-    pub fn deviation(&self, replay: &mut Replay, cuts: &[CutPrimitive]) -> f64 {
+    pub fn deviation(&self, replay: &Replay, cuts: &[CutPrimitive]) -> f64 {
         let triangles: Vec<[u32; 3]> = cuts.iter().flat_map(|cut| replay.triangles(cut)).collect();
         if triangles.is_empty() {
             // Nothing is left of it: as far off as it was large.
             return 2.0 * self.radius;
         }
-        let roots = replay.roots();
         let level = Sheet::new(replay.positions(), triangles);
         let middle = |t: [u32; 3]| {
             let p = level.corners(t);
             [0, 1, 2].map(|i| (p[0][i] + p[1][i] + p[2][i]) / 3.0)
         };
+        // This direction first: its hints are good, and what it finds spares the other one most of its searches.
+        let count = replay.positions().len();
+        let step = count.div_ceil(MOST_SAMPLES).max(1);
+        let vertices = (0..count as u32).step_by(step);
+        let there =
+            level.largest_distance(vertices.map(|vertex| (self.sheet.position(vertex), replay.root(vertex))), 0.0);
         // A vertex that is left has kept its number.
         let middles = level.triangles().iter().map(|&t| (middle(t), t[0]));
         let corners = level.triangles().iter().map(|&t| (level.position(t[0]), t[0]));
         let step = (level.triangles().len() * 2).div_ceil(MOST_SAMPLES).max(1);
-        let back = self.sheet.largest_distance(middles.chain(corners).step_by(step), 0.0);
-        let step = roots.len().div_ceil(MOST_SAMPLES).max(1);
-        let vertices = roots.iter().zip(0..).map(|(&root, vertex)| (self.sheet.position(vertex), root));
-        level.largest_distance(vertices.step_by(step), back)
+        self.sheet.largest_distance(middles.chain(corners).step_by(step), there)
     }
 }

@@ -113,7 +113,7 @@ fn measure(mesh: &Mesh, sequence: &Progressive) -> f64 {
         replay.advance(sequence.cut_at((mesh.triangles() as f64 * ratio).round() as usize));
         let cuts = replay.primitives();
         began = now();
-        std::hint::black_box(source.deviation(&mut replay, &cuts));
+        std::hint::black_box(source.deviation(&replay, &cuts));
         spent += now() - began;
     }
     spent

@@ -2,6 +2,7 @@
 //!
 //! Knows positions and triangles only. Deterministic: splits by median, ties by triangle number.
 
+mod grid;
 pub mod near;
 
 use crate::quadric::{cross, dot, sub};

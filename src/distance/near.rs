@@ -2,12 +2,13 @@
 //!
 //! Where a point comes from a vertex of the other surface's numbering, the faces around that vertex, or around the vertex
 //! that a walk downhill from there ends at, are near the point: their distance bounds the true one from above, and nearly
-//! always shows that the point cannot be the one that is furthest off. Only the others are searched for in a tree. The
+//! always shows that the point cannot be the one that is furthest off. Only the others are searched for. The
 //! result is that of a search for every point.
 
 use std::sync::OnceLock;
 
-use super::{Surface, squared_distance_to_triangle};
+use super::grid::Grid;
+use super::squared_distance_to_triangle;
 use crate::quadric::{dot, sub};
 
 /// A surface with its connectivity.
@@ -19,7 +20,7 @@ pub struct Sheet<'a> {
     start: Vec<u32>,
     ring: Vec<u32>,
     /// Made when the first point needs it.
-    tree: OnceLock<Surface>,
+    grid: OnceLock<Grid>,
 }
 
 /// Longest walk, in edges.
@@ -44,7 +45,7 @@ impl<'a> Sheet<'a> {
                 *at += 1;
             }
         }
-        Self { positions, triangles, start, ring, tree: OnceLock::new() }
+        Self { positions, triangles, start, ring, grid: OnceLock::new() }
     }
 
     /// The triangles, as vertices.
@@ -124,7 +125,6 @@ impl<'a> Sheet<'a> {
     /// `least`; else `least`. `∞` if there is no surface but there are points.
     pub fn largest_distance(&self, points: impl Iterator<Item = ([f64; 3], u32)>, least: f64) -> f64 {
         let mut most = least * least;
-        let mut search = Search { sheet: self, asked: 0 };
         let mut doubtful: Vec<(f64, [f64; 3])> = Vec::new();
         let mut room = FEW_DOUBTS;
         for (p, vertex) in points {
@@ -132,65 +132,36 @@ impl<'a> Sheet<'a> {
             if most < bound {
                 doubtful.push((bound, p));
                 if room <= doubtful.len() {
-                    most = search.settle_one(&mut doubtful, most);
+                    most = self.settle_one(&mut doubtful, most);
                     room = FEW_DOUBTS.max(doubtful.len() * 2);
                 }
             }
         }
         while !doubtful.is_empty() {
-            most = search.settle_one(&mut doubtful, most);
+            most = self.settle_one(&mut doubtful, most);
         }
         if most <= least * least { least } else { most.sqrt() }
+    }
+
+    /// Finds the distance of the most doubtful point; returns the new largest one and drops whom it settles.
+    fn settle_one(&self, doubtful: &mut Vec<(f64, [f64; 3])>, most: f64) -> f64 {
+        let Some(&(bound, p)) = doubtful.iter().reduce(|a, b| if a.0 < b.0 { b } else { a }) else { return most };
+        let grid = self.grid.get_or_init(|| Grid::new(self.positions, &self.triangles));
+        let exact = grid.squared_distance_above(self.positions, &self.triangles, p, most, bound);
+        // The point itself is settled whatever was found.
+        let most = most.max(exact);
+        doubtful.retain(|&(bound, q)| most < bound && q != p);
+        most
     }
 }
 
 /// Doubts that are gathered before the greatest of them is settled.
 const FEW_DOUBTS: usize = 64;
 
-/// Searches through all triangles that are cheaper than building a tree.
-const FEW_SEARCHES: usize = 4;
-
-/// Exact distances, for few points.
-struct Search<'a> {
-    sheet: &'a Sheet<'a>,
-    asked: usize,
-}
-
-impl Search<'_> {
-    /// Finds the distance of the most doubtful point; returns the new largest one and drops whom it settles.
-    fn settle_one(&mut self, doubtful: &mut Vec<(f64, [f64; 3])>, most: f64) -> f64 {
-        let Some(&(_, p)) = doubtful.iter().reduce(|a, b| if a.0 < b.0 { b } else { a }) else { return most };
-        let exact = self.squared_distance_above(p, most);
-        // The point itself is settled whatever was found.
-        let most = most.max(exact);
-        doubtful.retain(|&(bound, q)| most < bound && q != p);
-        most
-    }
-
-    fn squared_distance_above(&mut self, p: [f64; 3], enough: f64) -> f64 {
-        self.asked += 1;
-        let mut triangles = self.sheet.triangles.iter().map(|&t| self.sheet.corners(t));
-        if FEW_SEARCHES < self.asked || self.sheet.tree.get().is_some() {
-            return self
-                .sheet
-                .tree
-                .get_or_init(|| Surface::new(&triangles.collect::<Vec<_>>()))
-                .squared_distance_above(p, enough);
-        }
-        let mut nearest = f64::INFINITY;
-        while enough < nearest
-            && let Some(triangle) = triangles.next()
-        {
-            nearest = nearest.min(squared_distance_to_triangle(p, &triangle));
-        }
-        nearest
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::distance::largest_distance;
+    use crate::distance::{Surface, largest_distance};
 
     /// Corners of a bumpy sheet of `2 n²` triangles.
     fn sheet(n: u32, bump: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {

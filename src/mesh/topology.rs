@@ -201,9 +201,7 @@ impl Topology {
         topology.alive = topology.faces.len();
         topology.link_wedges();
         topology.link_rings();
-        for vertex in 0..weld.vertices as u32 {
-            topology.classify_edges(vertex);
-        }
+        topology.classify_all();
         (topology, weld)
     }
 
@@ -472,6 +470,31 @@ impl Topology {
         if let Some(at) = ring.iter().position(|&c| c == corner) {
             ring.copy_within(at + 1.., at);
             self.ring_len[vertex as usize] -= 1;
+        }
+    }
+
+    /// Sets the kind of every edge; all are [`EdgeKind::Border`] before.
+    fn classify_all(&mut self) {
+        for index in 0..self.faces.len() {
+            let face = self.faces[index];
+            for (edge, next) in NEXT.into_iter().enumerate() {
+                let (vertex, end) = (face.v[edge], face.v[next]);
+                let (mut faces, mut across) = (0, Corner::default());
+                for &corner in self.ring(vertex) {
+                    let other = &self.faces[corner.face()].v;
+                    if other[NEXT[corner.at()]] == end || other[PREVIOUS[corner.at()]] == end {
+                        faces += 1;
+                        across = if corner.face() == index { across } else { corner };
+                    }
+                }
+                // The first of two faces does it for both.
+                if faces == 2 && index < across.face() {
+                    let kind = self.kind_between(Corner::new(index, edge), across, end);
+                    let is_next = self.faces[across.face()].v[NEXT[across.at()]] == end;
+                    self.kinds[index][edge] = kind;
+                    self.kinds[across.face()][if is_next { across.at() } else { PREVIOUS[across.at()] }] = kind;
+                }
+            }
         }
     }
 

@@ -143,9 +143,12 @@ impl<'a> Replay<'a> {
         self.steps = self.steps.max(steps.min(self.sequence.steps.len()));
     }
 
-    /// For each source vertex the one that it has become.
-    pub fn roots(&mut self) -> Vec<u32> {
-        (0..self.vertex_up.len() as u32).map(|vertex| find(&mut self.vertex_up, vertex)).collect()
+    /// What a source vertex has become.
+    pub fn root(&self, mut vertex: u32) -> u32 {
+        while self.vertex_up[vertex as usize] != vertex {
+            vertex = self.vertex_up[vertex as usize];
+        }
+        vertex
     }
 
     /// Positions of vertices that are still there, object space.
