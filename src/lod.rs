@@ -144,16 +144,15 @@ pub fn chain(parts: &[Part], settings: &ChainSettings, judge: Option<Judge>) -> 
             Target::Ratio(_) | Target::Triangles(_) => {
                 let wanted = wanted(target, source);
                 let cuts = allocation.cuts(wanted.saturating_sub(fixed));
-                let left: usize = sequences.iter().zip(&cuts).map(|(s, &c)| s.triangles_after(c)).sum();
+                let left = left(&sequences, &cuts);
                 (cuts, if left + fixed <= wanted { Stop::Target } else { Stop::NoLegalPair })
             }
             Target::Appearance(limit) => {
                 let Some(judge) = judge else { continue };
                 let difference = |cuts: &[usize]| judge(&cut_all(parts, &mut cutters, cuts, Finish::Draft));
-                let left =
-                    |cuts: &[usize]| -> usize { sequences.iter().zip(cuts).map(|(s, &c)| s.triangles_after(c)).sum() };
-                let fine =
-                    |steps: &usize| (left(&allocation.cuts_after(*steps)) + fixed) as f64 > COARSE * source as f64;
+                let fine = |steps: &usize| {
+                    (left(&sequences, &allocation.cuts_after(*steps)) + fixed) as f64 > COARSE * source as f64
+                };
                 let first = first_not(allocation.steps(), fine);
                 let cuts = cuts_by_looks(&allocation, limit, first, difference);
                 let all = sequences.iter().zip(&cuts).all(|(s, &c)| c == s.steps.len());
@@ -173,7 +172,7 @@ pub fn chain(parts: &[Part], settings: &ChainSettings, judge: Option<Judge>) -> 
         if kept_one {
             stop = Stop::NoLegalPair;
         }
-        let left: usize = sequences.iter().zip(&cuts).map(|(s, &c)| s.triangles_after(c)).sum();
+        let left = left(&sequences, &cuts);
         if triangles_before <= left + fixed {
             continue;
         }
@@ -250,10 +249,14 @@ fn wanted(target: Target, source: usize) -> usize {
     }
 }
 
+/// Triangles of all sequences at their cuts.
+fn left(sequences: &[&Progressive], cuts: &[usize]) -> usize {
+    sequences.iter().zip(cuts).map(|(sequence, &cut)| sequence.triangles_after(cut)).sum()
+}
+
 /// A level that shows nothing is no level: steps back in the last sequence that still had triangles.
 fn keep_something(sequences: &[&Progressive], mut cuts: Vec<usize>, fixed: usize) -> (Vec<usize>, bool) {
-    let left = |cuts: &[usize]| -> usize { sequences.iter().zip(cuts).map(|(s, &c)| s.triangles_after(c)).sum() };
-    if 0 < fixed || 0 < left(&cuts) {
+    if 0 < fixed || 0 < left(sequences, &cuts) {
         return (cuts, false);
     }
     // The part whose last step cost most is the one to keep.
@@ -261,7 +264,7 @@ fn keep_something(sequences: &[&Progressive], mut cuts: Vec<usize>, fixed: usize
     let Some(at) = (0..sequences.len()).max_by(|&a, &b| cost(sequences[a]).total_cmp(&cost(sequences[b]))) else {
         return (cuts, false);
     };
-    while 0 < cuts[at] && left(&cuts) == 0 {
+    while 0 < cuts[at] && left(sequences, &cuts) == 0 {
         cuts[at] -= 1;
     }
     (cuts, true)

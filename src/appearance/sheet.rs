@@ -13,20 +13,8 @@ const STRETCH: i32 = 8;
 /// Pixels between two pictures.
 const GAP: u32 = 4;
 
-/// Draws a sheet as PNG: for each of `directions` the source, then each level and its difference from the source
+/// Draws a sheet: for each of `directions` the source, then each level and its difference from the source
 /// (|source − level| × 8 in each colour, black where they are equal). `size` is the side of one picture in pixels.
-pub fn sheet(
-    renderer: &dyn Render,
-    source: &Drawable,
-    levels: &[&Drawable],
-    frame: Frame,
-    directions: &[DVec3],
-    size: u32,
-) -> Result<Vec<u8>, RenderError> {
-    Ok(png(&draw(renderer, source, levels, frame, directions, size)?))
-}
-
-/// The same as a picture.
 pub fn draw(
     renderer: &dyn Render,
     source: &Drawable,
@@ -82,7 +70,8 @@ pub fn jpeg(image: &RgbImage) -> Vec<u8> {
     bytes
 }
 
-fn png(image: &RgbImage) -> Vec<u8> {
+/// All colours as they are.
+pub fn png(image: &RgbImage) -> Vec<u8> {
     let mut bytes = Vec::new();
     image.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png).expect("an image in memory can be written");
     bytes

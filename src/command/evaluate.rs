@@ -11,7 +11,7 @@ use super::{Context, Exit};
 use crate::appearance::drawable::Drawable;
 use crate::appearance::render::RenderError;
 use crate::appearance::renderer::{self, Chosen};
-use crate::appearance::sheet::sheet;
+use crate::appearance::sheet;
 use crate::appearance::views::rhombicuboctahedron;
 use crate::config::Renderer;
 use crate::evaluation::{Candidate, Evaluator, Options, Subject};
@@ -95,7 +95,8 @@ impl Evaluate {
             let views: Vec<_> = self.views.iter().map(|&view| all[usize::from(view)]).collect();
             let drawable = &reference.drawable;
             // As large as fits a screen with one candidate.
-            let png = sheet(renderer, drawable, &levels, drawable.frame(), &views, self.size.min(512))?;
+            let sheet = sheet::draw(renderer, drawable, &levels, drawable.frame(), &views, self.size.min(512))?;
+            let png = sheet::png(&sheet);
             std::fs::write(path, png).with_context(|| format!("failed to write `{}`", path.display()))?;
         }
         if context.json {

@@ -17,7 +17,7 @@ use crate::plan::PartTask;
 use crate::quadric::{cross, dot, sub};
 
 /// Pictures of a round.
-const VIEWS: usize = 20;
+const VIEWS: usize = 32;
 
 /// Least weight of what is never seen, against 1 for what is seen from everywhere: it may still be seen from closer by.
 const UNSEEN: f64 = 0.1;

@@ -6,7 +6,7 @@ use crate::appearance::material::Alpha;
 use crate::appearance::metric::Reference;
 use crate::appearance::render::{RenderError, pictures};
 use crate::appearance::shade::BACKGROUND;
-use crate::appearance::sheet::sheet;
+use crate::appearance::sheet::{draw, png};
 use crate::appearance::views::{fibonacci, rhombicuboctahedron};
 use glam::DMat4;
 
@@ -180,7 +180,7 @@ fn sizes_and_odd_input_are_answered() {
 #[test]
 fn sheets_have_a_row_for_each_view_and_two_columns_for_each_level() {
     let (ball, coarse) = (one(sphere(9), looks(matte(), Vec::new())), one(sphere(4), looks(matte(), Vec::new())));
-    let bytes = sheet(&Cpu, &ball, &[&ball, &coarse], ball.frame(), &fibonacci(3), 32).unwrap();
+    let bytes = png(&draw(&Cpu, &ball, &[&ball, &coarse], ball.frame(), &fibonacci(3), 32).unwrap());
     let image = image::load_from_memory(&bytes).unwrap().into_rgb8();
     assert_eq!(image.dimensions(), (5 * 36 - 4, 3 * 36 - 4));
     let black = |column: u32| (0..32).all(|i| image.get_pixel(column * 36 + i, i).0 == [0; 3]);
