@@ -195,7 +195,7 @@ pub fn chain(parts: &[Part], settings: &ChainSettings, judge: Option<Judge>) -> 
 /// What a level is cut for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Finish {
-    /// To be looked at once: not measured, not put in order for a GPU.
+    /// To be looked at once: not measured. Its triangles are in their final order, for of faces that coincide the first is seen.
     Draft,
     /// To be kept.
     Whole,
@@ -353,17 +353,17 @@ impl<'a> Cutter<'a> {
             Finish::Draft => 0.0,
             Finish::Whole => self.source.deviation(&self.replay, &cuts),
         };
-        let primitive = |(index, cut)| self.primitive(index, &sources[index], cut, finish);
+        let primitive = |(index, cut)| self.primitive(index, &sources[index], cut);
         let primitives = cuts.into_iter().enumerate().map(primitive).collect();
         Level { primitives, error }
     }
 
-    fn primitive(&self, index: usize, source: &Primitive, mut cut: CutPrimitive, finish: Finish) -> LevelPrimitive {
+    fn primitive(&self, index: usize, source: &Primitive, mut cut: CutPrimitive) -> LevelPrimitive {
         if cut.indices.is_empty() {
             return LevelPrimitive { indices: Vec::new(), vertices: LevelVertices::Source };
         }
         let count = cut.wedges.len();
-        let in_order = self.settings.vertex_cache && finish == Finish::Whole;
+        let in_order = self.settings.vertex_cache;
         if in_order {
             cut.indices = meshopt::optimize_vertex_cache(&cut.indices, count);
         }

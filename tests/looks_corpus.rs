@@ -32,9 +32,7 @@ fn check(corpus: &Path, asset: &str, size: u32) -> usize {
     assert!(!reached.is_empty(), "{asset}");
     for level in &reached {
         let (target, found) = (TARGETS[level.number as usize - 1], level.d_rms.unwrap());
-        // The search draws triangles in the order of the cut, the level has them in the order of the vertex cache: of faces
-        // that coincide another may be seen.
-        assert!(found <= target * 1.001, "{asset}: {found} for {target}");
+        assert!(found <= target, "{asset}: {found} for {target}");
         // The next cut is the finest level with fewer triangles.
         let next = bake(folder.path(), corpus, asset, size, &format!("{{ triangles = {} }}", level.triangles - 1));
         let next = &next.scenes[0].meshes[0].levels[0];
