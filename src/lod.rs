@@ -208,8 +208,8 @@ fn cut_all(parts: &[Part], cutters: &mut [Cutter], cuts: &[usize], finish: Finis
 }
 
 /// The cuts after which the next contraction, anywhere in the mesh, exceeds the limit. The difference grows with the
-/// contractions, though not strictly: the search by halves finds one such place. It begins at `first`, behind which the
-/// difference is smaller than before, since normals of coarse levels are fitted.
+/// contractions, though not strictly: the search by halves finds one such place, and looks a little further. It begins at
+/// `first`, behind which the difference is smaller than before, since coarse levels are fitted.
 fn cuts_by_looks(
     allocation: &Allocation,
     limit: f64,
@@ -227,8 +227,20 @@ fn cuts_by_looks(
         }
         next = within + (over - within) / 2;
     }
+    // `over` is known to be too much; a few contractions more may not be, above all where few triangles are left.
+    let mut further = over + 1;
+    while further <= allocation.steps() && further <= over + LOOK_FURTHER {
+        if difference(&allocation.cuts_after(further)) <= limit {
+            within = further;
+            over = further;
+        }
+        further += 1;
+    }
     allocation.cuts_after(within)
 }
+
+/// Contractions after one that is too much that are looked at all the same.
+const LOOK_FURTHER: usize = 4;
 
 /// The first number up to `last` for which `holds` is false, if it is true up to there; else `last`.
 fn first_not(last: usize, holds: impl Fn(&usize) -> bool) -> usize {
