@@ -28,9 +28,10 @@ fn check(corpus: &Path, asset: &str, size: u32) -> usize {
     let folder = tempfile::tempdir().unwrap();
     let lod: Vec<String> = TARGETS.iter().map(|target| format!("{{ appearance = {target} }}")).collect();
     let reached = bake(folder.path(), corpus, asset, size, &lod.join(", "));
-    let reached: Vec<_> = reached.scenes.iter().flat_map(|scene| &scene.meshes).flat_map(|m| &m.levels).collect();
+    let meshes = || reached.scenes[0].meshes.iter().enumerate();
+    let reached: Vec<_> = meshes().flat_map(|(mesh, record)| record.levels.iter().map(move |l| (mesh, l))).collect();
     assert!(!reached.is_empty(), "{asset}");
-    for level in &reached {
+    for &(mesh, level) in &reached {
         let (target, found) = (TARGETS[level.number as usize - 1], level.d_rms.unwrap());
         assert!(found <= target, "{asset}: {found} for {target}");
         if level.stop == Stop::NoLegalPair {
@@ -38,7 +39,7 @@ fn check(corpus: &Path, asset: &str, size: u32) -> usize {
         }
         // The next cut is the finest level with fewer triangles.
         let next = bake(folder.path(), corpus, asset, size, &format!("{{ triangles = {} }}", level.triangles - 1));
-        let next = &next.scenes[0].meshes[0].levels[0];
+        let next = &next.scenes[0].meshes[mesh].levels[0];
         // Two triangles fewer, or all that was left of a loose part.
         assert!(next.triangles < level.triangles, "{asset}: {} after {}", next.triangles, level.triangles);
         let over = next.d_rms.unwrap();
