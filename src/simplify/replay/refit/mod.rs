@@ -123,10 +123,10 @@ impl Replay<'_> {
         let faces = self.faces(cuts);
         let samples = self.samples(faces.len(), importance);
         let mut surface = Surface::new(&faces, self.positions.iter().map(|p| p.map(f64::from)).collect());
-        let mut placed = surface.places(&samples);
+        let mut placed = surface.places(&samples, None);
         if fit.shape {
             surface.fit_positions(&samples, &placed, &importance.bends, fit.hold_borders);
-            placed = surface.places(&samples);
+            placed = surface.places(&samples, Some(&placed));
             for field in self.welded.fields.clone().iter().filter(|field| field.kind != FieldKind::Normal) {
                 match field.components {
                     1 => self.fit_values::<1>(&surface, cuts, field, &samples, &placed),

@@ -188,7 +188,7 @@ mod tests {
     fn fit(normal: impl Fn([f64; 3]) -> [f64; 3]) -> Fitted {
         let (faces, positions) = square();
         let (surface, samples) = (Surface::new(&faces, positions), samples(normal));
-        surface.normals(&samples, &surface.places(&samples), |_, _| [0.0, 0.0, 1.0], 0.9)
+        surface.normals(&samples, &surface.places(&samples, None), |_, _| [0.0, 0.0, 1.0], 0.9)
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! The surface of a level, on which points of the source find their places.
 
+use rayon::prelude::*;
+
 use super::{Face, Sample, unit};
 use crate::quadric::{cross, dot, sub};
 
@@ -8,6 +10,8 @@ pub(super) struct Surface<'a> {
     pub(super) faces: &'a [Face],
     pub(super) positions: Vec<[f64; 3]>,
     flat: Vec<[f64; 3]>,
+    /// Middle and radius of each face: most faces are further off than the best one, which this tells soon.
+    balls: Vec<[f64; 4]>,
     start: Vec<u32>,
     ring: Vec<u32>,
 }
@@ -44,24 +48,35 @@ impl<'a> Surface<'a> {
                 *at += 1;
             }
         }
-        let mut out = Self { faces, positions, flat: Vec::new(), start, ring };
+        let mut out = Self { faces, positions, flat: Vec::new(), balls: Vec::new(), start, ring };
         out.turn();
         out
     }
 
-    /// Brings the faces' normals up to date with the positions.
+    /// Brings what is known of the faces up to date with the positions.
     pub(super) fn turn(&mut self) {
+        let corners = |face: &Face| face.v.map(|v| self.positions[v as usize]);
         let normal = |face: &Face| {
-            let p = face.v.map(|v| self.positions[v as usize]);
+            let p = corners(face);
             unit(cross(sub(p[1], p[0]), sub(p[2], p[0]))).unwrap_or([0.0; 3])
         };
+        let ball = |face: &Face| {
+            let p = corners(face);
+            let middle = [0, 1, 2].map(|axis| (p[0][axis] + p[1][axis] + p[2][axis]) / 3.0);
+            let squared = p.map(|p| sub(p, middle)).map(|off| dot(off, off)).into_iter().fold(0.0, f64::max);
+            [middle[0], middle[1], middle[2], squared.sqrt()]
+        };
         self.flat = self.faces.iter().map(normal).collect();
+        self.balls = self.faces.iter().map(ball).collect();
     }
 
-    /// Where each sample is on the surface.
-    pub(super) fn places(&self, samples: &[Sample]) -> Vec<Option<Placed>> {
-        let mut tried = Vec::new();
-        samples.iter().map(|sample| self.place(sample, &mut tried)).collect()
+    /// Where each sample is on the surface; `before` tells where it was before the vertices moved.
+    pub(super) fn places(&self, samples: &[Sample], before: Option<&[Option<Placed>]>) -> Vec<Option<Placed>> {
+        let place = |tried: &mut Vec<u32>, (number, sample): (usize, &Sample)| {
+            let hint = before.and_then(|before| before[number]).map(|placed| self.faces[placed.face as usize].v);
+            self.place(sample, hint.unwrap_or(sample.near), tried)
+        };
+        samples.par_iter().enumerate().map_init(Vec::new, place).collect()
     }
 
     /// The faces at a vertex.
@@ -70,9 +85,11 @@ impl<'a> Surface<'a> {
     }
 
     /// The face of the sample's primitive, turned like it, that is nearest to it on a walk downhill.
-    /// `tried` is scratch room.
-    fn place(&self, sample: &Sample, tried: &mut Vec<u32>) -> Option<Placed> {
+    /// The walk begins at the vertices `near`; `tried` is scratch room.
+    fn place(&self, sample: &Sample, near: [u32; 3], tried: &mut Vec<u32>) -> Option<Placed> {
         let mut best: Option<(f64, Placed)> = None;
+        // Distance of the best.
+        let mut reach = f64::INFINITY;
         tried.clear();
         let (at, flat) = (sample.at.map(f64::from), sample.flat.map(f64::from));
         let mut ask = |vertex: u32, best: &mut Option<(f64, Placed)>| {
@@ -85,13 +102,19 @@ impl<'a> Surface<'a> {
                 if own.primitive != sample.primitive || dot(self.flat[face as usize], flat) < SAME_SIDE {
                     continue;
                 }
+                let [x, y, z, radius] = self.balls[face as usize];
+                let off = sub([x, y, z], at);
+                let most = reach + radius;
+                if dot(off, off) > most * most {
+                    continue;
+                }
                 let (squared, weights) = nearest(at, own.v.map(|v| self.positions[v as usize]));
                 if best.is_none_or(|(least, _)| squared < least) {
                     *best = Some((squared, Placed { face, weights }));
+                    reach = squared.sqrt();
                 }
             }
         };
-        let near = sample.near;
         ask(near[0], &mut best);
         if near[1] != near[0] {
             ask(near[1], &mut best);
