@@ -23,6 +23,10 @@ const FAR: f64 = 0.3;
 /// Sweeps over all vertices, each solved with its neighbours held.
 const SWEEPS: usize = 8;
 
+/// Furthest that anything goes from where it was, in differences to its neighbours: where samples say next to nothing of a
+/// vertex, least squares say anything.
+const REACH: f64 = 0.5;
+
 /// A sample whose values are further from the face's than this share of the face's extent has another chart's.
 const SAME_CHART: f64 = 0.25;
 
@@ -132,16 +136,22 @@ impl Surface<'_> {
         vertices.sort_unstable();
         vertices.dedup();
         vertices.retain(|&v| !is_held[v as usize]);
+        let longest = |vertex: u32| {
+            let ends = self.ring(vertex).iter().flat_map(|&face| self.faces[face as usize].v);
+            let squares = ends.map(|end| sub(start[end as usize], start[vertex as usize])).map(|edge| dot(edge, edge));
+            squares.fold(0.0, f64::max).sqrt()
+        };
+        let reach: Vec<f64> = vertices.iter().map(|&vertex| REACH * longest(vertex)).collect();
         for _ in 0..SWEEPS {
-            for &vertex in &vertices {
-                self.settle(vertex, start[vertex as usize], samples, &spots);
+            for (&vertex, &reach) in vertices.iter().zip(&reach) {
+                self.settle(vertex, start[vertex as usize], reach, samples, &spots);
             }
         }
         self.turn();
     }
 
-    /// Moves one vertex to where it is best while the others are where they are.
-    fn settle(&mut self, vertex: u32, start: [f64; 3], samples: &[Sample], spots: &Spots) {
+    /// Moves one vertex to where it is best while the others are where they are, but not out of `reach` of its `start`.
+    fn settle(&mut self, vertex: u32, start: [f64; 3], reach: f64, samples: &[Sample], spots: &Spots) {
         let (mut matrix, mut right, mut sum) = ([0.0f64; 6], [0.0f64; 3], 0.0);
         for &face in self.ring(vertex) {
             let v = self.faces[face as usize].v;
@@ -179,6 +189,11 @@ impl Surface<'_> {
         for (to, row) in position.iter_mut().zip(rows) {
             *to += dot(row, right);
         }
+        let off = sub(*position, start);
+        let distance = dot(off, off).sqrt();
+        if reach < distance {
+            *position = [0, 1, 2].map(|axis| start[axis] + off[axis] * (reach / distance));
+        }
     }
 
     /// Fits the values of one field, which `wedge` tells for each corner of each face by number, to those of the samples,
@@ -206,6 +221,12 @@ impl Surface<'_> {
             (0..3).for_each(|at| around[wedge(face, at) as usize].push((face, at)));
         }
         let start = values.to_vec();
+        let reach: Vec<[f64; N]> = (around.iter().zip(&start))
+            .map(|(around, own)| {
+                let others = || around.iter().flat_map(|&(face, _)| corners(face, &start));
+                std::array::from_fn(|i| REACH * others().map(|other| (other[i] - own[i]).abs()).fold(0.0, f64::max))
+            })
+            .collect();
         for _ in 0..SWEEPS {
             for (own, around) in around.iter().enumerate() {
                 let (mut sum, mut right) = (0.0, [0.0; N]);
@@ -222,7 +243,9 @@ impl Surface<'_> {
                 let pull = PULL * sum;
                 if pull > 0.0 {
                     for i in 0..N {
-                        values[own][i] += (right[i] + pull * (start[own][i] - values[own][i])) / (sum + pull);
+                        let (start, reach) = (start[own][i], reach[own][i]);
+                        let value = values[own][i] + (right[i] + pull * (start - values[own][i])) / (sum + pull);
+                        values[own][i] = value.clamp(start - reach, start + reach);
                     }
                 }
             }
