@@ -24,7 +24,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 RATIOS = [0.5, 0.25, 0.1, 0.05]
-PEERS = ["gltfpack -se 1", "gltfpack", "glTF-Transform", "MeshLab", "Blender"]
+# Tools, and how cells name them.
+PEERS = {"gltfpack -se 1": "gs", "gltfpack": "gl", "glTF-Transform": "gT", "MeshLab": "Me", "Blender": "Bl"}
 # Counts closer than this are one level.
 SAME = 0.01
 # Scenes of fewer triangles are left out: a twentieth of them is nothing to look at.
@@ -203,7 +204,7 @@ def main():
         table = {}
         for (asset, _), (row, took) in zip(found, results):
             table[asset["name"]] = {str(ratio): row[ratio][0] for ratio in row}
-            shown = [f"{row[r][0]:.3f} {row[r][1][:2] if row[r][1] != 'gltfpack -se 1' else 'gs'}" if r in row else "–" for r in RATIOS]
+            shown = [f"{row[r][0]:.3f} {PEERS[row[r][1]]}" if r in row else "–" for r in RATIOS]
             print(f"| {asset['name']} | " + " | ".join(shown) + f" | {mean(c[0] for c in row.values()):.3f} | {took:.1f} |")
         by_ratio = [mean(row[r][0] for row, _ in results if r in row) for r in RATIOS]
         every = [cell[0] for row, _ in results for cell in row.values()]
