@@ -8,7 +8,7 @@
 //! Where the source leaves gaps:
 //! - *Area preservation.* The change ΔA of the area of the faces around the pair counts as `ΔA²` beside the quadric, which is
 //!   an area times a squared distance as well: thin sheets that fall together and parts that vanish cost what they were.
-//! - *Scale of attributes.* A difference of 1, times the configured weight, is a distance of one radius ([`super::clouds`]).
+//! - *Scale of attributes.* A difference of 1, times the configured weight, is a distance of one radius (`metric::clouds`).
 //! - *Error limit.* The threshold itself is the limit: joining parts is tried where it moves them less than the next
 //!   contraction would err.
 //! - *Bound.* The largest unified error of all contractions so far. As in the paper it is an approximate bound, from

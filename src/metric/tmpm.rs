@@ -4,7 +4,7 @@
 //! parametrisation serves every level, so that vertices keep their places in it: one end of an edge stays as it is. The
 //! price is the deviation between the surfaces just before and after, not accumulated (the paper's section on
 //! simplification, after Lindstrom and Turk's memoryless strategy); [`super::aps`] accumulates. Stretch, L2 and L∞, is measured
-//! on the levels ([`crate::compare::texture`]; `lodbake evaluate` tells it).
+//! on the levels (`compare::texture`; `lodbake evaluate` tells it).
 //!
 //! Where the source leaves gaps, or starts from an atlas of its own: the mesh's texture coordinates are the atlas. Its charts'
 //! borders are not straightened by moving them in the texture, which would need the pictures to be drawn again; they are

@@ -1,5 +1,5 @@
-//! Fits the vertices of a finished level to the source: where they are ([`shape`]), and their normals, which may part where
-//! the level has become too coarse for one normal at a vertex ([`normals`]).
+//! Fits the vertices of a finished level to the source: where they are (`shape`), and their normals, which may part where
+//! the level has become too coarse for one normal at a vertex (`normals`).
 //!
 //! Samples of the source's surface are carried over to the nearest faces of the level. Knows positions, values and which
 //! vertex became which; no sequence, no metric.
