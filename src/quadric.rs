@@ -186,6 +186,55 @@ pub fn lerp(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
     [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, a[2] + (b[2] - a[2]) * t]
 }
 
+/// Squared distance from `p` to a triangle, and the shares of its corners at the nearest point (C. Ericson, *Real-Time
+/// Collision Detection*, 2005, section 5.1.5).
+#[inline]
+pub fn nearest_on_triangle(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> (f64, [f64; 3]) {
+    let (ab, ac, ap) = (sub(b, a), sub(c, a), sub(p, a));
+    let weights = shares(p, [a, b, c], ab, ac, ap);
+    let at = [0, 1, 2].map(|i| a[i] * weights[0] + b[i] * weights[1] + c[i] * weights[2]);
+    let off = sub(p, at);
+    (dot(off, off), weights)
+}
+
+#[inline]
+fn shares(p: [f64; 3], [_, b, c]: [[f64; 3]; 3], ab: [f64; 3], ac: [f64; 3], ap: [f64; 3]) -> [f64; 3] {
+    let (d1, d2) = (dot(ab, ap), dot(ac, ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let bp = sub(p, b);
+    let (d3, d4) = (dot(ab, bp), dot(ac, bp));
+    if 0.0 <= d3 && d4 <= d3 {
+        return [0.0, 1.0, 0.0];
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && 0.0 <= d1 && d3 <= 0.0 {
+        let t = d1 / (d1 - d3);
+        return [1.0 - t, t, 0.0];
+    }
+    let cp = sub(p, c);
+    let (d5, d6) = (dot(ab, cp), dot(ac, cp));
+    if 0.0 <= d6 && d5 <= d6 {
+        return [0.0, 0.0, 1.0];
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && 0.0 <= d2 && d6 <= 0.0 {
+        let t = d2 / (d2 - d6);
+        return [1.0 - t, 0.0, t];
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && 0.0 <= d4 - d3 && 0.0 <= d5 - d6 {
+        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return [0.0, 1.0 - t, t];
+    }
+    let sum = va + vb + vc;
+    if sum <= 0.0 || sum.is_nan() {
+        return [1.0, 0.0, 0.0];
+    }
+    [va / sum, vb / sum, vc / sum]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -233,6 +282,22 @@ mod tests {
             for p in [[0.0, 0.0, 0.0], [1.5, -1.0, 2.0]] {
                 let x = [0, 1, 2].map(|i| p[i] - f64::from(origin[i] + by[i]));
                 assert!((moved.eval(x) - value(p)).abs() < 1e-4, "{by:?} {p:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_nearest_point_is_no_further_than_any_other() {
+        let triangle = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.5], [0.5, 1.5, 0.0]];
+        for i in 0..343 {
+            let p = [i % 7, i / 7 % 7, i / 49].map(|x| f64::from(x) * 0.6 - 1.5);
+            let (squared, weights) = nearest_on_triangle(p, triangle);
+            assert!(weights.iter().all(|&w| (-1e-12..=1.0 + 1e-12).contains(&w)), "{weights:?}");
+            for (a, b) in (0..=20).flat_map(|a| (0..=20 - a).map(move |b| (a, b))) {
+                let w = [a, b, 20 - a - b].map(|x| f64::from(x) / 20.0);
+                let q = [0, 1, 2].map(|axis| (0..3).map(|corner| triangle[corner][axis] * w[corner]).sum::<f64>());
+                let off = sub(p, q);
+                assert!(squared <= dot(off, off) + 1e-12, "{p:?}");
             }
         }
     }

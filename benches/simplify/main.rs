@@ -6,8 +6,8 @@
 //! files and looks: weld, topology, sequence, cuts, vertices of each level, measured errors (also shown apart). That of
 //! meshoptimizer is `meshopt_simplifyWithAttributes` from level to level and nothing else.
 //!
-//! `LODBAKE_CORPUS` names the corpus. `cargo bench -- [--rounds N] [--memory] [PART OF A NAME]..`; `--memory` adds the
-//! peak of the resident set, each in a process of its own.
+//! `LODBAKE_CORPUS` names the corpus. `cargo bench -- [--rounds N] [--only WORK] [--memory] [--threads] [PART OF A NAME]..`; `--memory`
+//! adds the peak of the resident set, each in a process of its own; `--threads` the wall time with one thread and with two.
 
 #![expect(clippy::print_stdout, reason = "a benchmark prints its table")]
 
@@ -27,20 +27,31 @@ use work::{Report, Work};
 struct Arguments {
     rounds: usize,
     memory: bool,
+    threads: bool,
+    works: Vec<Work>,
     names: Vec<String>,
 }
 
 fn main() -> ExitCode {
+    // Work that is done side by side is this thread's as well, so that its clock counts all.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+    pool.build_global().expect("the first to ask for threads");
     let mut words = std::env::args().skip(1).peekable();
     if words.peek().is_some_and(|word| word == memory::CHILD) {
         memory::child(&words.skip(1).collect::<Vec<_>>());
         return ExitCode::SUCCESS;
     }
-    let mut arguments = Arguments { rounds: 5, memory: false, names: Vec::new() };
+    let mut arguments =
+        Arguments { rounds: 5, memory: false, threads: false, works: Work::ALL.to_vec(), names: Vec::new() };
     while let Some(word) = words.next() {
         match word.as_str() {
             "--rounds" => arguments.rounds = words.next().and_then(|n| n.parse().ok()).unwrap_or(5),
+            "--only" => {
+                let only = words.next();
+                arguments.works.retain(|work| Some(work.name()) == only.as_deref());
+            }
             "--memory" => arguments.memory = true,
+            "--threads" => arguments.threads = true,
             // Cargo says this to every benchmark.
             "--bench" => {}
             name => arguments.names.push(name.to_owned()),
@@ -57,9 +68,9 @@ fn main() -> ExitCode {
 fn compare(asset: &Asset, arguments: &Arguments) {
     let triangles = asset.mesh.triangles();
     println!("\n{}: {triangles} triangles", asset.name);
-    let mut reports: Vec<Vec<Report>> = Work::ALL.iter().map(|_| Vec::new()).collect();
+    let mut reports: Vec<Vec<Report>> = arguments.works.iter().map(|_| Vec::new()).collect();
     for _ in 0..arguments.rounds {
-        for (work, reports) in Work::ALL.iter().zip(&mut reports) {
+        for (work, reports) in arguments.works.iter().zip(&mut reports) {
             reports.push(work.run(asset));
         }
     }
@@ -68,8 +79,8 @@ fn compare(asset: &Asset, arguments: &Arguments) {
         "", "least s", "median s", "ktri/s", "ratio", "sequence", "levels", "measure"
     );
     let least = |reports: &[Report]| reports.iter().map(Report::total).fold(f64::INFINITY, f64::min);
-    let peer = least(&reports[Work::ALL.len() - 1]);
-    for (work, reports) in Work::ALL.iter().zip(&mut reports) {
+    let peer = reports.last().map_or(f64::NAN, |reports| least(reports));
+    for (work, reports) in arguments.works.iter().zip(&mut reports) {
         reports.sort_by(|a, b| a.total().total_cmp(&b.total()));
         let (best, median) = (&reports[0], reports[reports.len() / 2].total());
         let levels: Vec<String> = best.levels.iter().map(|(n, error)| format!("{n} ({error:.5})")).collect();
@@ -88,5 +99,26 @@ fn compare(asset: &Asset, arguments: &Arguments) {
     }
     if arguments.memory {
         memory::compare(asset);
+    }
+    if arguments.threads {
+        threads(asset, arguments.rounds);
+    }
+}
+
+/// Wall time of the works of lodbake with one thread and with two, in turn. Means something on a machine that does
+/// nothing else.
+fn threads(asset: &Asset, rounds: usize) {
+    for work in Work::ALL.iter().filter(|work| **work != Work::Peer) {
+        let mut least = [f64::INFINITY; 2];
+        for _ in 0..rounds {
+            for (threads, least) in (1..).zip(&mut least) {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+                let began = std::time::Instant::now();
+                pool.install(|| work.run(asset));
+                *least = least.min(began.elapsed().as_secs_f64());
+            }
+        }
+        let [one, two] = least;
+        println!("{:10} wall {one:.3} s with one thread, {two:.3} s with two: {:.2} times", work.name(), one / two);
     }
 }

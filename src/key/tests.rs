@@ -155,9 +155,9 @@ fn what_is_not_used_is_not_in_the_key() {
 #[test]
 fn the_key_is_the_same_on_every_machine() {
     let [sequence, chain, scene] = keys(&settings(""), MeshParts::ALL);
-    insta::assert_snapshot!(sequence, @"c89527a5a721801ba40b3304c6cfa759cf8275cb97b9e04d66fcb0d1af85fc58");
-    insta::assert_snapshot!(chain, @"8154710ea80a4c38607285c28bb3a6903375310c4b4d983a4aec2dd7126e73e4");
-    insta::assert_snapshot!(scene, @"a5ad8b0876a9f07afec7381b7370744b3bc2df095abfb05c7d1d0b11792dd386");
+    insta::assert_snapshot!(sequence, @"b9b917ff1ea3f43a810db398b14ab9cfa4a6618e6d5d8a20080f087639b30bbf");
+    insta::assert_snapshot!(chain, @"d9e9f2294cd723c6382c95aff47612e15dd6aa5f9e385b43c6d5e61b2f1e75f9");
+    insta::assert_snapshot!(scene, @"1795b62a79fe3f8333fe8adab13dbba8fea08c6c017d56fcafa3a4660f25a29c");
     assert_eq!(sequence.to_string().parse(), Ok(sequence));
     assert!("x".parse::<JobKey>().is_err());
 }

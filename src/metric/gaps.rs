@@ -16,11 +16,11 @@
 //! - *Subset placement.* Pairs without an edge are not joined: the source's vertices have no attributes for it.
 
 use super::clouds::{Clouds, Differences};
-use super::parts::{Classes, Planes, average_distance, best_place, nearest_on, wedges_fit};
+use super::parts::{Classes, Planes, average_distance, best_place, wedges_fit};
 use super::{CostUnit, ErrorMetric, Placement, Price};
 use crate::mesh::layout::Layout;
 use crate::mesh::topology::{Contraction, NEXT, PREVIOUS, Topology};
-use crate::quadric::{cross, dot, sub};
+use crate::quadric::{cross, dot, nearest_on_triangle, sub};
 
 /// The metric.
 #[derive(Clone, Debug)]
@@ -121,7 +121,7 @@ fn projected(surface: &Topology, pair: [u32; 2], classes: &Classes, class: usize
             if classes.class(face.w[corner.at()]) != Some(class) {
                 continue;
             }
-            let (squared, shares) = nearest_on(position, surface.corners(face));
+            let (squared, shares) = nearest_on_triangle(position, surface.corners(face));
             if best.is_none_or(|(least, ..)| squared < least) {
                 best = Some((squared, corner.face(), shares));
             }

@@ -1,5 +1,5 @@
-//! What several metrics are made of: plane quadrics with areas, classes of wedges that a contraction joins, the nearest
-//! point of a triangle, and values that follow the edge.
+//! What several metrics are made of: plane quadrics with areas, classes of wedges that a contraction joins, and values
+//! that follow the edge.
 //!
 //! Knows no metric. Plane quadrics: M. Garland, P. Heckbert, 1997, weighted by area.
 
@@ -190,57 +190,9 @@ impl Classes {
     }
 }
 
-/// Squared distance from `p` to a triangle, and the shares of its corners at the nearest point: the foot on the plane if
-/// it lies inside, else the best point of the three edges.
-pub(super) fn nearest_on(p: [f64; 3], t: [[f64; 3]; 3]) -> (f64, [f64; 3]) {
-    let normal = cross(sub(t[1], t[0]), sub(t[2], t[0]));
-    let size = dot(normal, normal);
-    if size > 0.0 {
-        let share = |i: usize| {
-            let (u, v) = (t[(i + 1) % 3], t[(i + 2) % 3]);
-            dot(normal, cross(sub(v, u), sub(p, u))) / size
-        };
-        let shares = [share(0), share(1), share(2)];
-        if shares.iter().all(|&s| (0.0..=1.0).contains(&s)) {
-            let off = dot(normal, sub(p, t[0]));
-            return (off * off / size, shares);
-        }
-    }
-    let mut best = (f64::INFINITY, [1.0, 0.0, 0.0]);
-    for i in 0..3 {
-        let (u, v) = (t[i], t[(i + 1) % 3]);
-        let along = sub(v, u);
-        let squared = dot(along, along);
-        let k = if squared > 0.0 { (dot(sub(p, u), along) / squared).clamp(0.0, 1.0) } else { 0.0 };
-        let off = sub(p, lerp(u, v, k));
-        if dot(off, off) < best.0 {
-            let mut shares = [0.0; 3];
-            (shares[i], shares[(i + 1) % 3]) = (1.0 - k, k);
-            best = (dot(off, off), shares);
-        }
-    }
-    best
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_nearest_point_is_no_further_than_any_other() {
-        let triangle = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.5], [0.5, 1.5, 0.0]];
-        for i in 0..343 {
-            let p = [i % 7, i / 7 % 7, i / 49].map(|x| f64::from(x) * 0.6 - 1.5);
-            let (squared, shares) = nearest_on(p, triangle);
-            assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{shares:?}");
-            for (a, b) in (0..=20).flat_map(|a| (0..=20 - a).map(move |b| (a, b))) {
-                let w = [a, b, 20 - a - b].map(|x| f64::from(x) / 20.0);
-                let q = [0, 1, 2].map(|axis| (0..3).map(|corner| triangle[corner][axis] * w[corner]).sum::<f64>());
-                let off = sub(p, q);
-                assert!(squared <= dot(off, off) + 1e-12, "{p:?}");
-            }
-        }
-    }
 
     #[test]
     fn the_average_distance_is_a_length() {

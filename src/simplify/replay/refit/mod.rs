@@ -1,21 +1,29 @@
-//! Fits the vertices of a finished level to the source: where they are (`shape`), and their normals, which may part where
-//! the level has become too coarse for one normal at a vertex (`normals`).
+//! Fits the vertices of a finished level to the source: where they are (`shape`), their texture coordinates and colours
+//! (`values`), and their normals, which may part where the level has become too coarse for one normal at a vertex
+//! (`normals`).
 //!
-//! Samples of the source's surface are carried over to the nearest faces of the level. Knows positions, values and which
-//! vertex became which; no sequence, no metric.
+//! Samples of the source's surface are carried over to the nearest faces of the level, a batch at a time; what they ask is
+//! summed up face by face. Knows positions, values and which vertex became which; no sequence, no metric.
 
+mod around;
 mod normals;
+mod samples;
 mod shape;
+mod share;
 mod surface;
-
-use std::collections::BTreeMap;
+mod values;
 
 use super::{CutPrimitive, Replay, Welded, find};
 use crate::mesh::Mesh;
-use crate::mesh::layout::{Field, FieldKind};
+use crate::mesh::layout::FieldKind;
 use crate::mesh::visible::visible;
-use crate::quadric::{cross, dot, scale, sub};
+use crate::mesh::weld::NONE;
+use crate::quadric::{dot, scale};
+use normals::System;
+use samples::Samples;
+use shape::Moves;
 use surface::{Placed, Surface};
+use values::Values;
 
 /// What of a cut is fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,49 +73,15 @@ struct Face {
     primitive: u32,
 }
 
-/// A point of the source with what it stands for.
-#[derive(Clone, Copy, Debug)]
-struct Sample {
-    /// Where it is.
-    at: [f32; 3],
-    /// Shading normal, unit length; that of its face where the source has none.
-    normal: [f32; 3],
-    /// Normal of its face, unit length.
-    flat: [f32; 3],
-    /// Area that it stands for, by how much of it shows.
-    area: f32,
-    /// Stored vertices of its triangle.
-    corners: [u32; 3],
-    /// Which of [`POINTS`] it is in its triangle.
-    point: u8,
-    /// Vertices of the level that its corners became.
-    near: [u32; 3],
-    /// Primitive.
-    primitive: u32,
-    /// Number of its triangle among those of all primitives.
-    triangle: u32,
-}
+/// Weight of where a vertex was, or what it had, against that of all samples around it.
+const PULL: f64 = 0.05;
 
-impl Sample {
-    /// Shares of its triangle's corners.
-    fn shares(&self) -> [f64; 3] {
-        POINTS[self.point as usize]
-    }
-}
+/// Sweeps over all vertices, each solved with its neighbours held.
+const SWEEPS: usize = 8;
 
-const THIRD: f64 = 1.0 / 3.0;
-
-/// Points of a triangle: the one that stands for all of it, and the three that each stand for a third.
-const POINTS: [[f64; 3]; 4] = [
-    [THIRD; 3],
-    [2.0 * THIRD, 0.5 * THIRD, 0.5 * THIRD],
-    [0.5 * THIRD, 2.0 * THIRD, 0.5 * THIRD],
-    [0.5 * THIRD, 0.5 * THIRD, 2.0 * THIRD],
-];
-
-/// Samples of a face of the level that are enough, and that are plenty.
-const ENOUGH: usize = 8;
-const PLENTY: usize = 16;
+/// Furthest that anything goes from where it was, in differences to its neighbours: where samples say next to nothing of a
+/// vertex, least squares say anything.
+const REACH: f64 = 0.5;
 
 /// What a fit has changed of a surface, to be taken back.
 #[derive(Debug, Default)]
@@ -121,25 +95,74 @@ impl Replay<'_> {
     pub fn refit(&mut self, cuts: &mut [CutPrimitive], importance: &Importance, fit: Fit) {
         self.take_back();
         let faces = self.faces(cuts);
-        let samples = self.samples(faces.len(), importance);
+        let roots: Vec<u32> = (0..self.vertex_up.len() as u32).map(|v| find(&mut self.vertex_up, v)).collect();
+        let samples = Samples { mesh: self.mesh, welded: self.welded, importance, roots: &roots, faces: faces.len() };
         let mut surface = Surface::new(&faces, self.positions.iter().map(|p| p.map(f64::from)).collect());
-        let mut placed = surface.places(&samples, None);
+        // Faces of all samples: where to look after the vertices have moved.
+        let mut seen: Vec<u32> = Vec::new();
+        let mut placed: Vec<Placed> = Vec::new();
         if fit.shape {
-            surface.fit_positions(&samples, &placed, &importance.bends, fit.hold_borders);
-            placed = surface.places(&samples, Some(&placed));
-            for field in self.welded.fields.clone().iter().filter(|field| field.kind != FieldKind::Normal) {
-                match field.components {
-                    1 => self.fit_values::<1>(&surface, cuts, field, &samples, &placed),
-                    2 => self.fit_values::<2>(&surface, cuts, field, &samples, &placed),
-                    3 => self.fit_values::<3>(&surface, cuts, field, &samples, &placed),
-                    4 => self.fit_values::<4>(&surface, cuts, field, &samples, &placed),
-                    _ => {}
+            let mut asked = vec![Moves::default(); faces.len()];
+            samples.visit(|_, batch| {
+                placed.clear();
+                placed.resize(batch.len(), Placed::NOWHERE);
+                surface.place_all(batch, &mut placed);
+                for (sample, placed) in batch.iter().zip(&placed).filter(|(_, placed)| placed.face != NONE) {
+                    asked[placed.face as usize].add(sample, placed, surface.corners(placed.face));
+                }
+                seen.extend(placed.iter().map(|placed| placed.face));
+            });
+            surface.fit_positions(&asked, fit.hold_borders);
+        }
+        let (wedges, first) = wedges(cuts);
+        let wedges_of = |face: u32| {
+            let Face { local, primitive, .. } = faces[face as usize];
+            local.map(|local| first[primitive as usize] + local)
+        };
+        let fields = self.welded.fields.iter().filter(|field| fit.shape && field.kind != FieldKind::Normal);
+        let mut values: Vec<Values> = fields
+            .filter_map(|field| {
+                let row = |&wedge: &u32| {
+                    let row = &self.values[wedge as usize * self.welded.columns + field.offset..][..field.components];
+                    std::array::from_fn(|i| row.get(i).map_or(0.0, |&x| f64::from(x)))
+                };
+                Values::new(self.mesh, field, faces.len(), wedges.iter().map(row).collect())
+            })
+            .collect();
+        let mut normals = vec![System::default(); if fit.normals.is_some() { faces.len() } else { 0 }];
+        samples.visit(|first, batch| {
+            if values.is_empty() && normals.is_empty() {
+                return;
+            }
+            placed.clear();
+            let hints = seen.get(first..first + batch.len());
+            let nowhere = Placed::NOWHERE;
+            placed
+                .extend((0..batch.len()).map(|i| hints.map_or(nowhere, |hints| Placed { face: hints[i], ..nowhere })));
+            surface.place_all(batch, &mut placed);
+            for (sample, placed) in batch.iter().zip(&placed).filter(|(_, placed)| placed.face != NONE) {
+                let wedges = wedges_of(placed.face);
+                values.iter_mut().for_each(|values| values.add(sample, placed, wedges));
+                if let Some(system) = normals.get_mut(placed.face as usize) {
+                    system.add(sample, placed);
                 }
             }
+        });
+        let solved: Vec<_> = values.iter().map(|values| (values.field, values.solve(wedges_of))).collect();
+        for (field, solved) in solved {
+            for (&wedge, solved) in wedges.iter().zip(solved) {
+                let at = wedge as usize * self.welded.columns + field.offset;
+                for (at, value) in (at..at + field.components).zip(solved) {
+                    self.before.values.push((at, self.values[at]));
+                    self.values[at] = value as f32;
+                }
+            }
+        }
+        if fit.shape {
             self.move_vertices(&surface);
         }
         if let Some(same) = fit.normals {
-            self.fit_normals(&surface, cuts, &samples, &placed, same);
+            self.fit_normals(&surface, cuts, &normals, same);
         }
     }
 
@@ -155,56 +178,14 @@ impl Replay<'_> {
     }
 
     fn move_vertices(&mut self, surface: &Surface) {
-        let mut vertices: Vec<u32> = surface.faces.iter().flat_map(|face| face.v).collect();
-        vertices.sort_unstable();
-        vertices.dedup();
-        for vertex in vertices {
+        for vertex in surface.vertices() {
             let to = &mut self.positions[vertex as usize];
             self.before.positions.push((vertex, *to));
             *to = surface.positions[vertex as usize].map(|x| x as f32);
         }
     }
 
-    fn fit_values<const N: usize>(
-        &mut self,
-        surface: &Surface,
-        cuts: &[CutPrimitive],
-        field: &Field,
-        samples: &[Sample],
-        placed: &[Option<Placed>],
-    ) {
-        // Wedges by number, those of all primitives.
-        let mut first = vec![0u32];
-        for cut in cuts {
-            first.push(first[first.len() - 1] + cut.wedges.len() as u32);
-        }
-        let columns = self.welded.columns;
-        let places: Vec<usize> =
-            cuts.iter().flat_map(|cut| &cut.wedges).map(|&wedge| wedge as usize * columns + field.offset).collect();
-        let mut values: Vec<[f64; N]> =
-            places.iter().map(|&at| std::array::from_fn(|i| f64::from(self.values[at + i]))).collect();
-        let wedge = |face: u32, at: usize| {
-            let Face { local, primitive, .. } = surface.faces[face as usize];
-            first[primitive as usize] + local[at]
-        };
-        let mesh = self.mesh;
-        surface.fit_values(placed, samples, wedge, &mut values, |sample| shape::value_at(mesh, field, sample));
-        for (at, values) in places.into_iter().zip(values) {
-            for (at, value) in (at..).zip(values) {
-                self.before.values.push((at, self.values[at]));
-                self.values[at] = value as f32;
-            }
-        }
-    }
-
-    fn fit_normals(
-        &mut self,
-        surface: &Surface,
-        cuts: &mut [CutPrimitive],
-        samples: &[Sample],
-        placed: &[Option<Placed>],
-        same: f64,
-    ) {
+    fn fit_normals(&self, surface: &Surface, cuts: &mut [CutPrimitive], asked: &[System], same: f64) {
         let now: Vec<Option<Vec<[f32; 3]>>> = (self.mesh.primitives.iter().zip(&*cuts))
             .map(|(source, cut)| source.attribute("NORMAL").map(|_| self.normals(cut)))
             .collect();
@@ -216,20 +197,20 @@ impl Replay<'_> {
             let normals = now[primitive as usize].as_ref();
             normals.map_or([0.0, 0.0, 1.0], |normals| normals[local[at] as usize].map(f64::from))
         };
-        let fitted = surface.normals(samples, placed, corner_normal, same);
+        let fitted = surface.normals(asked, corner_normal, same);
         let mut face = 0;
         for (cut, now) in cuts.iter_mut().zip(&now) {
             let faces = cut.indices.len() / 3;
             if now.is_some() {
-                let mut numbers: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+                let mut parted = Parted::new(cut.wedges.len());
                 let (mut wedges, mut normals) = (Vec::new(), Vec::new());
                 for (at, index) in cut.indices.iter_mut().enumerate() {
                     let normal = fitted.corners[face + at / 3][at % 3];
-                    let number = *numbers.entry((*index, normal)).or_insert_with(|| {
+                    let number = parted.number(*index, normal);
+                    if number as usize == wedges.len() {
                         wedges.push(cut.wedges[*index as usize]);
                         normals.push(fitted.normals[normal as usize].map(|x| x as f32));
-                        wedges.len() as u32 - 1
-                    });
+                    }
                     *index = number;
                 }
                 (cut.wedges, cut.normals) = (wedges, Some(normals));
@@ -250,52 +231,43 @@ impl Replay<'_> {
         }
         faces
     }
+}
 
-    /// Samples of the source for a level of `faces` faces.
-    fn samples(&mut self, faces: usize, importance: &Importance) -> Vec<Sample> {
-        let total = self.mesh.triangles();
-        let step = (total / (PLENTY * faces).max(1)).max(1);
-        let points = if total < ENOUGH * faces { 1..4 } else { 0..1 };
-        let mut out = Vec::with_capacity(total / step * points.len());
-        let mut first = 0;
-        for (primitive, source) in (0..).zip(&self.mesh.primitives) {
-            let normals = source.attribute("NORMAL").filter(|a| a.components == 3);
-            let start = self.welded.weld.stored_start[primitive as usize];
-            for (number, t) in source.indices.chunks_exact(3).enumerate().step_by(step) {
-                let corners = [t[0], t[1], t[2]];
-                let p = corners.map(|i| source.positions()[i as usize].map(f64::from));
-                let across = cross(sub(p[1], p[0]), sub(p[2], p[0]));
-                let Some(flat) = unit(across) else { continue };
-                let triangle = first + number;
-                let area = dot(across, across).sqrt() / 2.0 * f64::from(importance.seen[triangle]);
-                let n = corners.map(|i| {
-                    normals.map_or(flat, |a| [0, 1, 2].map(|axis| f64::from(a.values[i as usize * 3 + axis])))
-                });
-                let near = corners.map(|i| {
-                    let wedge = self.welded.weld.stored[start + i as usize];
-                    find(&mut self.vertex_up, self.welded.weld.wedge_vertex[wedge as usize])
-                });
-                for point in points.clone() {
-                    let w = POINTS[point];
-                    let mix = |v: &[[f64; 3]; 3]| [0, 1, 2].map(|i| v[0][i] * w[0] + v[1][i] * w[1] + v[2][i] * w[2]);
-                    let Some(normal) = unit(mix(&n)) else { continue };
-                    let narrow = |v: [f64; 3]| v.map(|x| x as f32);
-                    out.push(Sample {
-                        at: narrow(mix(&p)),
-                        normal: narrow(normal),
-                        flat: narrow(flat),
-                        area: (area / points.len() as f64) as f32,
-                        corners,
-                        point: point as u8,
-                        near,
-                        primitive,
-                        triangle: triangle as u32,
-                    });
-                }
-            }
-            first += source.indices.len() / 3;
+/// The wedges of all primitives, and the place of each primitive's first one.
+fn wedges(cuts: &[CutPrimitive]) -> (Vec<u32>, Vec<u32>) {
+    let first = cuts.iter().scan(0, |sum, cut| {
+        let first = *sum;
+        *sum += cut.wedges.len() as u32;
+        Some(first)
+    });
+    (cuts.iter().flat_map(|cut| &cut.wedges).copied().collect(), first.collect())
+}
+
+/// Numbers for local vertices of which some part.
+struct Parted {
+    /// The first entry of each vertex.
+    first: Vec<u32>,
+    /// Normal and the next entry of the same vertex; an entry's place is its number.
+    entries: Vec<[u32; 2]>,
+}
+
+impl Parted {
+    fn new(vertices: usize) -> Self {
+        Self { first: vec![NONE; vertices], entries: Vec::with_capacity(vertices) }
+    }
+
+    /// The number of `vertex` with that normal; new ones come in order.
+    fn number(&mut self, vertex: u32, normal: u32) -> u32 {
+        let mut at = self.first[vertex as usize];
+        while at != NONE && self.entries[at as usize][0] != normal {
+            at = self.entries[at as usize][1];
         }
-        out
+        if at == NONE {
+            at = self.entries.len() as u32;
+            self.entries.push([normal, self.first[vertex as usize]]);
+            self.first[vertex as usize] = at;
+        }
+        at
     }
 }
 

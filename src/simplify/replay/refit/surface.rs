@@ -2,26 +2,43 @@
 
 use rayon::prelude::*;
 
-use super::{Face, Sample, unit};
-use crate::quadric::{cross, dot, sub};
+use super::around::{Around, Corner};
+use super::samples::Sample;
+use super::{Face, unit};
+use crate::mesh::weld::NONE;
+use crate::quadric::{cross, dot, nearest_on_triangle, sub};
 
 /// The level's surface.
 pub(super) struct Surface<'a> {
     pub(super) faces: &'a [Face],
     pub(super) positions: Vec<[f64; 3]>,
-    flat: Vec<[f64; 3]>,
-    /// Middle and radius of each face: most faces are further off than the best one, which this tells soon.
-    balls: Vec<[f64; 4]>,
-    start: Vec<u32>,
-    ring: Vec<u32>,
+    turned: Vec<Turned>,
+    around: Around,
+}
+
+/// How a face lies.
+#[derive(Clone, Copy, Debug)]
+struct Turned {
+    /// Unit normal; zero without an area.
+    flat: [f64; 3],
+    /// Middle and radius: most faces are further off than the best one, which this tells soon.
+    ball: [f64; 4],
+    /// Square of a distance below which a point right above or below has found its face.
+    right_above: f64,
 }
 
 /// A sample on its face.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed {
+    /// [`NONE`]: on no face.
     pub(super) face: u32,
     /// Shares of the face's corners, which sum to 1.
-    pub(super) weights: [f64; 3],
+    pub(super) shares: [f64; 3],
+}
+
+impl Placed {
+    /// On no face.
+    pub(super) const NOWHERE: Self = Self { face: NONE, shares: [0.0; 3] };
 }
 
 /// A sample may lie on a face that is turned from its own by less than this: cosine of 72°.
@@ -30,175 +47,137 @@ const SAME_SIDE: f64 = 0.31;
 /// Longest walk over the level in search of the nearest face, in vertices.
 const MOST_STEPS: usize = 8;
 
+/// A sample is right above or below a face whose area, times this, is more than its squared distance.
+const RIGHT_ABOVE: f64 = 0.01;
+
+/// Samples that one thread places one after the other: each begins where the one before it lay.
+const RUN: usize = 1 << 10;
+
+/// A search for one sample's face.
+#[derive(Default)]
+struct Search {
+    tried: Vec<u32>,
+    /// One bit for some of their numbers: most faces are new, which this tells at once.
+    bits: u64,
+    best: Option<Placed>,
+    /// Squared distance of the best, and the distance.
+    squared: f64,
+    reach: f64,
+}
+
 impl<'a> Surface<'a> {
     /// Of `faces` over `positions`.
     pub(super) fn new(faces: &'a [Face], positions: Vec<[f64; 3]>) -> Self {
-        let mut start = vec![0u32; positions.len() + 2];
-        for &v in faces.iter().flat_map(|face| &face.v) {
-            start[v as usize + 2] += 1;
-        }
-        for at in 2..start.len() {
-            start[at] += start[at - 1];
-        }
-        let mut ring = vec![0; faces.len() * 3];
-        for (index, face) in faces.iter().enumerate() {
-            for &v in &face.v {
-                let at = &mut start[v as usize + 1];
-                ring[*at as usize] = index as u32;
-                *at += 1;
-            }
-        }
-        let mut out = Self { faces, positions, flat: Vec::new(), balls: Vec::new(), start, ring };
+        let around = Around::new(faces.len() as u32, positions.len(), |face| faces[face as usize].v);
+        let mut out = Self { faces, positions, turned: Vec::new(), around };
         out.turn();
         out
     }
 
+    /// Corner positions of a face.
+    #[inline]
+    pub(super) fn corners(&self, face: u32) -> [[f64; 3]; 3] {
+        self.faces[face as usize].v.map(|v| self.positions[v as usize])
+    }
+
     /// Brings what is known of the faces up to date with the positions.
     pub(super) fn turn(&mut self) {
-        let corners = |face: &Face| face.v.map(|v| self.positions[v as usize]);
-        let normal = |face: &Face| {
-            let p = corners(face);
-            unit(cross(sub(p[1], p[0]), sub(p[2], p[0]))).unwrap_or([0.0; 3])
-        };
-        let ball = |face: &Face| {
-            let p = corners(face);
+        let turned = |face: u32| {
+            let p = self.corners(face);
+            let across = cross(sub(p[1], p[0]), sub(p[2], p[0]));
+            let area = dot(across, across).sqrt() / 2.0;
             let middle = [0, 1, 2].map(|axis| (p[0][axis] + p[1][axis] + p[2][axis]) / 3.0);
             let squared = p.map(|p| sub(p, middle)).map(|off| dot(off, off)).into_iter().fold(0.0, f64::max);
-            [middle[0], middle[1], middle[2], squared.sqrt()]
-        };
-        self.flat = self.faces.iter().map(normal).collect();
-        self.balls = self.faces.iter().map(ball).collect();
-    }
-
-    /// Where each sample is on the surface; `before` tells where it was before the vertices moved.
-    pub(super) fn places(&self, samples: &[Sample], before: Option<&[Option<Placed>]>) -> Vec<Option<Placed>> {
-        let place = |tried: &mut Vec<u32>, (number, sample): (usize, &Sample)| {
-            let hint = before.and_then(|before| before[number]).map(|placed| self.faces[placed.face as usize].v);
-            self.place(sample, hint.unwrap_or(sample.near), tried)
-        };
-        samples.par_iter().enumerate().map_init(Vec::new, place).collect()
-    }
-
-    /// The faces at a vertex.
-    pub(super) fn ring(&self, vertex: u32) -> &[u32] {
-        &self.ring[self.start[vertex as usize] as usize..self.start[vertex as usize + 1] as usize]
-    }
-
-    /// The face of the sample's primitive, turned like it, that is nearest to it on a walk downhill.
-    /// The walk begins at the vertices `near`; `tried` is scratch room.
-    fn place(&self, sample: &Sample, near: [u32; 3], tried: &mut Vec<u32>) -> Option<Placed> {
-        let mut best: Option<(f64, Placed)> = None;
-        // Distance of the best.
-        let mut reach = f64::INFINITY;
-        tried.clear();
-        let (at, flat) = (sample.at.map(f64::from), sample.flat.map(f64::from));
-        let mut ask = |vertex: u32, best: &mut Option<(f64, Placed)>| {
-            for &face in self.ring(vertex) {
-                if tried.contains(&face) {
-                    continue;
-                }
-                tried.push(face);
-                let own = &self.faces[face as usize];
-                if own.primitive != sample.primitive || dot(self.flat[face as usize], flat) < SAME_SIDE {
-                    continue;
-                }
-                let [x, y, z, radius] = self.balls[face as usize];
-                let off = sub([x, y, z], at);
-                let most = reach + radius;
-                if dot(off, off) > most * most {
-                    continue;
-                }
-                let (squared, weights) = nearest(at, own.v.map(|v| self.positions[v as usize]));
-                if best.is_none_or(|(least, _)| squared < least) {
-                    *best = Some((squared, Placed { face, weights }));
-                    reach = squared.sqrt();
-                }
+            Turned {
+                flat: unit(across).unwrap_or([0.0; 3]),
+                ball: [middle[0], middle[1], middle[2], squared.sqrt()],
+                right_above: RIGHT_ABOVE * area,
             }
         };
-        ask(near[0], &mut best);
-        if near[1] != near[0] {
-            ask(near[1], &mut best);
+        self.turned = (0..self.faces.len() as u32).map(turned).collect();
+    }
+
+    /// Finds the place of each sample; `placed` tells on which faces to look first.
+    pub(super) fn place_all(&self, samples: &[Sample], placed: &mut [Placed]) {
+        let run = |(samples, placed): (&[Sample], &mut [Placed])| {
+            let mut search = Search::default();
+            let mut last = NONE;
+            for (sample, placed) in samples.iter().zip(placed) {
+                let hint = if placed.face == NONE { last } else { placed.face };
+                *placed = self.place(sample, hint, &mut search);
+                last = placed.face;
+            }
+        };
+        samples.par_chunks(RUN).zip(placed.par_chunks_mut(RUN)).for_each(run);
+    }
+
+    /// The corners at a vertex.
+    #[inline]
+    pub(super) fn ring(&self, vertex: u32) -> &[Corner] {
+        self.around.of(vertex)
+    }
+
+    /// The face of the sample's primitive, turned like it, that is nearest to it on a walk downhill from the face `hint`
+    /// and what became of the sample's own corners. A face that has the sample right above or below it ends the walk.
+    fn place(&self, sample: &Sample, hint: u32, search: &mut Search) -> Placed {
+        search.tried.clear();
+        (search.bits, search.best) = (0, None);
+        (search.squared, search.reach) = (f64::INFINITY, f64::INFINITY);
+        if hint != NONE && self.ask(hint, sample, search) {
+            return search.best.unwrap_or(Placed::NOWHERE);
         }
-        if near[2] != near[0] && near[2] != near[1] {
-            ask(near[2], &mut best);
+        let near = sample.near;
+        for (at, vertex) in near.into_iter().enumerate() {
+            if !near[..at].contains(&vertex) && self.ask_around(vertex, sample, search) {
+                return search.best.unwrap_or(Placed::NOWHERE);
+            }
         }
         for _ in 0..MOST_STEPS {
-            let Some((least, placed)) = best else { break };
-            for v in self.faces[placed.face as usize].v {
-                ask(v, &mut best);
+            let Some(placed) = search.best else { break };
+            let least = search.squared;
+            for vertex in self.faces[placed.face as usize].v {
+                if self.ask_around(vertex, sample, search) {
+                    return search.best.unwrap_or(Placed::NOWHERE);
+                }
             }
-            if best.is_some_and(|(now, _)| least <= now) {
+            if least <= search.squared {
                 break;
             }
         }
-        best.map(|(_, placed)| placed)
+        search.best.unwrap_or(Placed::NOWHERE)
     }
-}
 
-/// Squared distance from `p` to a triangle, and the shares of its corners at the nearest point (C. Ericson, *Real-Time
-/// Collision Detection*, 2005, section 5.1.5).
-fn nearest(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> (f64, [f64; 3]) {
-    let (ab, ac, ap) = (sub(b, a), sub(c, a), sub(p, a));
-    let weights = shares(p, [a, b, c], ab, ac, ap);
-    let at = [0, 1, 2].map(|i| a[i] * weights[0] + b[i] * weights[1] + c[i] * weights[2]);
-    let off = sub(p, at);
-    (dot(off, off), weights)
-}
+    /// [`Self::ask`] for all faces at a vertex.
+    #[inline]
+    fn ask_around(&self, vertex: u32, sample: &Sample, search: &mut Search) -> bool {
+        self.ring(vertex).iter().any(|corner| self.ask(corner.face(), sample, search))
+    }
 
-fn shares(p: [f64; 3], [_, b, c]: [[f64; 3]; 3], ab: [f64; 3], ac: [f64; 3], ap: [f64; 3]) -> [f64; 3] {
-    let (d1, d2) = (dot(ab, ap), dot(ac, ap));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return [1.0, 0.0, 0.0];
-    }
-    let bp = sub(p, b);
-    let (d3, d4) = (dot(ab, bp), dot(ac, bp));
-    if 0.0 <= d3 && d4 <= d3 {
-        return [0.0, 1.0, 0.0];
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && 0.0 <= d1 && d3 <= 0.0 {
-        let t = d1 / (d1 - d3);
-        return [1.0 - t, t, 0.0];
-    }
-    let cp = sub(p, c);
-    let (d5, d6) = (dot(ab, cp), dot(ac, cp));
-    if 0.0 <= d6 && d5 <= d6 {
-        return [0.0, 0.0, 1.0];
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && 0.0 <= d2 && d6 <= 0.0 {
-        let t = d2 / (d2 - d6);
-        return [1.0 - t, 0.0, t];
-    }
-    let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && 0.0 <= d4 - d3 && 0.0 <= d5 - d6 {
-        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return [0.0, 1.0 - t, t];
-    }
-    let sum = va + vb + vc;
-    if sum <= 0.0 || sum.is_nan() {
-        return [1.0, 0.0, 0.0];
-    }
-    [va / sum, vb / sum, vc / sum]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_nearest_point_is_no_further_than_any_other() {
-        let triangle = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.5], [0.5, 1.5, 0.0]];
-        for i in 0..343 {
-            let p = [i % 7, i / 7 % 7, i / 49].map(|x| f64::from(x) * 0.6 - 1.5);
-            let (squared, weights) = nearest(p, triangle);
-            assert!(weights.iter().all(|&w| (-1e-12..=1.0 + 1e-12).contains(&w)), "{weights:?}");
-            for (a, b) in (0..=20).flat_map(|a| (0..=20 - a).map(move |b| (a, b))) {
-                let w = [a, b, 20 - a - b].map(|x| f64::from(x) / 20.0);
-                let q = [0, 1, 2].map(|axis| (0..3).map(|corner| triangle[corner][axis] * w[corner]).sum::<f64>());
-                let off = sub(p, q);
-                assert!(squared <= dot(off, off) + 1e-12, "{p:?}");
-            }
+    /// Holds a face against the best one so far. Whether no other need be asked.
+    #[inline]
+    fn ask(&self, face: u32, sample: &Sample, search: &mut Search) -> bool {
+        let bit = 1 << (face & 63);
+        if search.bits & bit != 0 && search.tried.contains(&face) {
+            return false;
         }
+        search.bits |= bit;
+        search.tried.push(face);
+        let turned = &self.turned[face as usize];
+        let [x, y, z, radius] = turned.ball;
+        let off = sub([x, y, z], sample.at);
+        let most = search.reach + radius;
+        if dot(off, off) > most * most
+            || self.faces[face as usize].primitive != sample.primitive
+            || dot(turned.flat, sample.flat) < SAME_SIDE
+        {
+            return false;
+        }
+        let (squared, shares) = nearest_on_triangle(sample.at, self.corners(face));
+        if search.squared <= squared {
+            return false;
+        }
+        search.best = Some(Placed { face, shares });
+        (search.squared, search.reach) = (squared, squared.sqrt());
+        squared < turned.right_above && shares.iter().all(|&share| 0.0 < share)
     }
 }
