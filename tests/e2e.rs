@@ -19,6 +19,8 @@ mod explain;
 mod init;
 #[path = "e2e/inspect.rs"]
 mod inspect;
+#[path = "e2e/instances.rs"]
+mod instances;
 #[path = "e2e/methods.rs"]
 mod methods;
 #[path = "e2e/report.rs"]

@@ -44,7 +44,10 @@ pub fn scene(scene: &SceneRecord, fact: Fact, bound: f64) -> String {
             let copy = scene.meshes.iter().find_map(|mesh| Some((mesh, mesh.copy_of?)));
             copy.map_or_else(String::new, |(mesh, of)| {
                 let original = scene.meshes.iter().find(|other| other.index == of).map_or_else(String::new, mesh_name);
-                format!("`{}` repeats `{original}`: let nodes refer to one mesh or, where materials differ, share its accessors", mesh_name(mesh))
+                format!(
+                    "`{}` repeats `{original}`: `recover = \"exact\"` in `[instances]` makes instances of such meshes",
+                    mesh_name(mesh)
+                )
             })
         }
         _ => general(fact, bound),

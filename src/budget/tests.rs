@@ -31,6 +31,7 @@ pub(crate) fn scene(path: &str) -> SceneRecord {
         instances: 3,
         draw_calls: 6,
         copy_of: (index == 1).then_some(0),
+        instance_of: None,
         triangles: 1000,
         vertices: 600,
         radius: 2.0,
@@ -100,7 +101,7 @@ fn a_finding_says_where_how_much_and_what_would_help() {
     Error props/lamp.glb: mesh `twin`, source: 1,000 triangles; limit 999, 0.10 % over (this is the source: make it coarser where it is modelled, or name the levels that the limit holds for, e.g. `level = [1, 2]`)
     ");
     insta::assert_snapshot!(told("[[budget]]\nd_rms = { warn = 5 }\nmin_levels = 1\nundeclared = 0", None), @r#"
-    Error props/lamp.glb: 1 repeated mesh; limit 0 (`twin` repeats `shade`: let nodes refer to one mesh or, where materials differ, share its accessors)
+    Error props/lamp.glb: 1 repeated mesh; limit 0 (`twin` repeats `shade`: `recover = "exact"` in `[instances]` makes instances of such meshes)
     Error props/lamp.glb: mesh `twin`: 0 levels; at least 1 (no levels: it is sealed)
     Warning props/lamp.glb: mesh `shade`, level 2: d_RMS 6.00; limit 5.00, 20 % over (ask for a higher ratio than 0.5 at level 2, a level by `appearance`, or try `effort = "best"`)
     "#);

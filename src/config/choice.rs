@@ -146,6 +146,23 @@ choice! {
 }
 
 choice! {
+    /// Which meshes of a scene that are another one of it, repeated, become instances of it.
+    Recover {
+        /// None: every mesh keeps bytes of its own.
+        #[default]
+        None = "none",
+        /// Those with the same numbers, in whatever order.
+        Exact = "exact",
+        /// Also those that were moved and turned.
+        Rigid = "rigid",
+        /// Also those that were scaled, by the same factor in every direction.
+        Similar = "similar",
+        /// Also those that were mirrored: their nodes get a negative scale, which some readers draw inside out.
+        Mirrored = "mirrored",
+    }
+}
+
+choice! {
     /// Unit of a level's `error`.
     ErrorUnit {
         /// Fraction of the sub-mesh's bounding radius.

@@ -55,5 +55,9 @@ pub const LOOK_SIZE: u32 = 64;
 /// The same where looks decide which level is taken: rank correlation 0.997.
 pub const DECIDING_LOOK_SIZE: u32 = 128;
 
+/// What may be left between a mesh and the instance that it becomes, as a fraction of the radius: a hundredth of a pixel on a
+/// mesh that fills a screen, and thirty times what single precision rounds away on its way through a transform.
+pub const TOLERANCE: f64 = 1e-5;
+
 /// Levels where `[[lod]]` is absent: shares of the source's triangles.
 pub const RATIOS: [f64; 3] = [0.5, 0.25, 0.1];

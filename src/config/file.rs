@@ -8,7 +8,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::budget::BudgetEntry;
-use super::choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Storage};
+use super::choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Recover, Storage};
 use super::defaults;
 
 /// A string or a list of strings.
@@ -92,6 +92,9 @@ pub(super) struct PipelineFile {
 
     /// How looks are measured.
     pub appearance: Option<AppearanceTable>,
+
+    /// Which repeated meshes become instances.
+    pub instances: Option<InstancesTable>,
 
     /// The levels, finest first. Default: ratios 0.5, 0.25 and 0.1.
     #[schemars(length(min = 1, max = 32))]
@@ -193,6 +196,21 @@ pub(super) struct AppearanceTable {
     pub size: Option<u32>,
 }
 
+/// Instances that nobody declared: meshes of a scene that are another one of it, reordered, moved, scaled or mirrored. Their
+/// nodes then show the first one, and their bytes go: level 0 is the source's within the tolerance.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct InstancesTable {
+    /// Which of them become instances; the rest is told in the report. Default: none, and none is looked for.
+    #[schemars(extend("default" = Recover::default()))]
+    pub recover: Option<Recover>,
+
+    /// Largest distance that may be left to the mesh as it was: of positions as a fraction of its radius, of the tips of normals
+    /// and tangents; more than 0, at most 0.01. Default: 0.00001.
+    #[schemars(range(max = 0.01), extend("exclusiveMinimum" = 0, "default" = defaults::TOLERANCE))]
+    pub tolerance: Option<f64>,
+}
+
 /// One level: exactly one of `ratio`, `triangles`, `error`, `pixels` and `appearance` says how coarse it is.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -265,6 +283,9 @@ pub(super) struct OverrideEntry {
 
     /// As `[appearance]`; keys that are not given keep their value.
     pub appearance: Option<AppearanceTable>,
+
+    /// As `[instances]`; keys that are not given keep their value.
+    pub instances: Option<InstancesTable>,
 
     /// As `[[lod]]`; replaces the whole list.
     #[schemars(length(min = 1, max = 32))]

@@ -19,12 +19,13 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 pub use budget::{Bounds, Budget, Fact, Limit};
-pub use choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Renderer, Storage};
+pub use choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Recover, Renderer, Storage};
 pub use error::{ConfigError, Names, Place};
 pub use file::schema;
 pub use globs::Globs;
 pub use settings::{
-    AppearanceSettings, ChainSettings, EmitSettings, LevelTarget, SceneSettings, Screen, SimplifySettings, Weights,
+    AppearanceSettings, ChainSettings, EmitSettings, InstanceSettings, LevelTarget, SceneSettings, Screen,
+    SimplifySettings, Weights,
 };
 
 /// A folder: as the user wrote it, for messages, and where it is.

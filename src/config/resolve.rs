@@ -6,10 +6,13 @@ use std::path::{Component, Path, PathBuf};
 use super::check::Document;
 use super::choice::{ErrorUnit, Placement, Storage};
 use super::error::{ConfigError, Place};
-use super::file::{AppearanceTable, LodEntry, OneOrMany, OverrideEntry, PipelineFile, ScreenTable, SimplifyTable};
+use super::file::{
+    AppearanceTable, InstancesTable, LodEntry, OneOrMany, OverrideEntry, PipelineFile, ScreenTable, SimplifyTable,
+};
 use super::globs::Globs;
 use super::settings::{
-    AppearanceSettings, ChainSettings, EmitSettings, LevelTarget, SceneSettings, Screen, SimplifySettings, Weights,
+    AppearanceSettings, ChainSettings, EmitSettings, InstanceSettings, LevelTarget, SceneSettings, Screen,
+    SimplifySettings, Weights,
 };
 use super::{Folder, Pipeline, budget, defaults};
 
@@ -24,6 +27,7 @@ pub(super) struct Layer {
     screen: ScreenTable,
     simplify: SimplifyTable,
     appearance: AppearanceTable,
+    instances: InstancesTable,
     lod: Option<Vec<LodEntry>>,
 }
 
@@ -40,6 +44,7 @@ impl Layer {
         lay!(over.simplify, self.simplify; metric, effort, normal, texcoord, color, border, seam, crease);
         lay!(over.simplify, self.simplify; placement, min_triangles, lock_border, candidates);
         lay!(over.appearance, self.appearance; record, size);
+        lay!(over.instances, self.instances; recover, tolerance);
     }
 
     /// Fills what is still absent with defaults.
@@ -69,6 +74,10 @@ impl Layer {
             appearance: AppearanceSettings {
                 record: self.appearance.record.unwrap_or(true),
                 size: self.appearance.size.unwrap_or(defaults::LOOK_SIZE),
+            },
+            instances: InstanceSettings {
+                recover: self.instances.recover.unwrap_or_default(),
+                tolerance: self.instances.tolerance.unwrap_or(defaults::TOLERANCE),
             },
         };
         if self.appearance.size.is_none() && settings.looks_decide() {
@@ -127,6 +136,7 @@ pub(super) fn pipeline(document: &Document<'_>, file: &str) -> Result<Pipeline, 
         screen: typed.screen.unwrap_or_default(),
         simplify: typed.simplify.unwrap_or_default(),
         appearance: typed.appearance.unwrap_or_default(),
+        instances: typed.instances.unwrap_or_default(),
         lod: typed.lod,
     };
     check_layer(document, &top, &layer)?;
@@ -166,6 +176,7 @@ fn override_layer(document: &Document<'_>, place: &Place, entry: OverrideEntry) 
         screen: entry.screen.unwrap_or_default(),
         simplify: entry.simplify.unwrap_or_default(),
         appearance: entry.appearance.unwrap_or_default(),
+        instances: entry.instances.unwrap_or_default(),
         lod: entry.lod,
     };
     check_layer(document, place, &layer)?;

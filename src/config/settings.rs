@@ -5,7 +5,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Storage};
+use super::choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Recover, Storage};
 use super::defaults;
 
 /// Everything that decides what becomes of one scene.
@@ -23,6 +23,25 @@ pub struct SceneSettings {
     pub emit: EmitSettings,
     /// How looks are measured.
     pub appearance: AppearanceSettings,
+    /// Which repeated meshes become instances. Absent in records of earlier versions.
+    #[serde(default)]
+    pub instances: InstanceSettings,
+}
+
+/// Which repeated meshes become instances.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct InstanceSettings {
+    /// How far such meshes may be from the first.
+    pub recover: Recover,
+    /// What may be left between a mesh and the one rebuilt from the first: of positions as a fraction of the radius, of
+    /// normals and tangents between unit vectors; more than 0.
+    pub tolerance: f64,
+}
+
+impl Default for InstanceSettings {
+    fn default() -> Self {
+        Self { recover: Recover::None, tolerance: defaults::TOLERANCE }
+    }
 }
 
 /// How looks are measured at bake time.

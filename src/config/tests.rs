@@ -51,11 +51,11 @@ fn paths_are_relative_to_the_file() {
 
 #[test]
 fn unknown_keys_name_the_nearest() {
-    insta::assert_snapshot!(refused("sotrage = 'shared'"), @"unknown key `sotrage` in `project/pipeline.toml` line 3 (did you mean `storage`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `lod`, `override`, `budget`, `baseline`)");
+    insta::assert_snapshot!(refused("sotrage = 'shared'"), @"unknown key `sotrage` in `project/pipeline.toml` line 3 (did you mean `storage`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `instances`, `lod`, `override`, `budget`, `baseline`)");
     insta::assert_snapshot!(refused("[screen]\npixel = 2"), @"unknown key `screen.pixel` in `project/pipeline.toml` line 4 (did you mean `pixels`? known: `pixels`, `height`, `fov`)");
     insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\n[[lod]]\ntriangle = 5"), @"unknown key `lod[1].triangle` in `project/pipeline.toml` line 6 (did you mean `triangles`? known: `ratio`, `triangles`, `error`, `unit`, `pixels`, `size`, `appearance`, `coverage`)");
     insta::assert_snapshot!(refused("normal = 0.1"), @r"
-    unknown key `normal` in `project/pipeline.toml` line 3 (did you mean `format`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `lod`, `override`, `budget`, `baseline`)
+    unknown key `normal` in `project/pipeline.toml` line 3 (did you mean `format`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `instances`, `lod`, `override`, `budget`, `baseline`)
     hint: `normal` is a key of `[simplify]`
     ");
     insta::assert_snapshot!(refused("[simplify]\nseam = 1\njobs = 2"), @r"
@@ -89,6 +89,7 @@ fn ranges_are_stated() {
     insta::assert_snapshot!(refused("[[lod]]\ntriangles = 0"), @"`project/pipeline.toml` line 4: lod[0].triangles 0 is out of range: must be 1 or more");
     insta::assert_snapshot!(refused("[[lod]]\ntriangles = 5_000_000_000"), @"`project/pipeline.toml` line 4: lod[0].triangles 5_000_000_000 is out of range: must be between 1 and 4294967295, both inclusive");
     insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\ncoverage = 1.01"), @"`project/pipeline.toml` line 5: lod[0].coverage 1.01 is out of range: must be more than 0 and at most 1");
+    insta::assert_snapshot!(refused("[instances]\ntolerance = 0"), @"`project/pipeline.toml` line 4: instances.tolerance 0 is out of range: must be more than 0 and at most 0.01");
     insta::assert_snapshot!(refused("[simplify]\nnormal = -0.1"), @"`project/pipeline.toml` line 4: simplify.normal -0.1 is out of range: must be 0 or more");
     insta::assert_snapshot!(refused("[simplify]\nnormal = nan"), @"`project/pipeline.toml` line 4: simplify.normal nan is out of range: must be finite, and 0 or more");
     insta::assert_snapshot!(refused("[simplify]\nborder = inf"), @"`project/pipeline.toml` line 4: simplify.border inf is out of range: must be finite, and 0 or more");

@@ -74,6 +74,14 @@ impl Buffers {
         Some(&data[..slot.length])
     }
 
+    /// Gives a buffer other bytes.
+    pub(super) fn replace(&mut self, index: usize, bytes: Vec<u8>) {
+        if let Some(slot) = self.slots.get_mut(index) {
+            slot.length = bytes.len();
+            slot.data = Some(Blob::Whole(Arc::new(bytes)));
+        }
+    }
+
     /// `length` bytes from `offset` of a buffer; every lie about them is an error at `place`.
     pub fn range(&self, index: usize, offset: u64, length: u64, place: impl Display) -> Result<&[u8], DocumentError> {
         let count = self.slots.len();

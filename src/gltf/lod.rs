@@ -245,15 +245,15 @@ impl Anchors {
 }
 
 /// `MSFT_lod` groups that the source brings along.
-struct SourceGroups {
+pub(super) struct SourceGroups {
     /// Nodes of all their levels, with everything below them.
-    members: BTreeSet<usize>,
+    pub(super) members: BTreeSet<usize>,
     /// Those of level 1 and lower.
     lower: BTreeSet<usize>,
 }
 
 impl SourceGroups {
-    fn find(nodes: &[Value]) -> Self {
+    pub(super) fn find(nodes: &[Value]) -> Self {
         let mut groups = Self { members: BTreeSet::new(), lower: BTreeSet::new() };
         for (i, node) in nodes.iter().enumerate() {
             let Some(lod) = json::extension(node, MSFT_LOD) else { continue };

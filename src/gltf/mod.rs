@@ -3,6 +3,7 @@
 //! `document` holds a file without loss; `buffers`, `accessor` and `decode` turn its bytes into numbers; `read` puts
 //! a whole scene together. `lod` appends levels to a document (`write` the binary data, `level_mesh` the meshes,
 //! `follow` whoever pointed at them), `package` makes files of it, and `rules` checks them.
+//! `share` writes instances that were found.
 
 pub mod accessor;
 pub mod buffers;
@@ -27,6 +28,8 @@ pub mod primitive;
 pub mod read;
 pub mod rules;
 pub mod scene;
+pub mod share;
+pub mod similarity;
 pub mod structure;
 pub mod triangles;
 pub mod uri;

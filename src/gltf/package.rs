@@ -47,6 +47,8 @@ pub struct Package {
     /// Buffers whose content will be written beside the document.
     written: Vec<NewBuffer>,
     converted: bool,
+    /// Ending of the names of `written`.
+    ending: &'static str,
     notes: Notes,
 }
 
@@ -59,12 +61,21 @@ impl Package {
         container: Container,
     ) -> Result<Self, WriteError> {
         let converted = document.container != container;
-        let mut package = Self { document, dependencies, written: Vec::new(), converted, notes: Notes::default() };
+        let mut package = Self {
+            document,
+            dependencies,
+            written: Vec::new(),
+            converted,
+            // Beside a source of this name there may be a `.bin` of this name, which another scene needs.
+            ending: if converted { "bin" } else { "mesh.bin" },
+            notes: Notes::default(),
+        };
         match container {
             _ if !converted => {}
             Container::Glb => package.convert_to_glb(buffers)?,
             Container::Gltf => package.convert_to_gltf(buffers)?,
         }
+        package.write_homeless(buffers)?;
         Ok(package)
     }
 
@@ -83,15 +94,13 @@ impl Package {
         let mut bin = None;
         for (i, buffer) in self.document.array("buffers")?.to_vec().iter().enumerate() {
             // Without data (compressed scenes declare such fallbacks) there is nothing to move.
-            let (Some(address), Some(bytes)) = (json::string(buffer, "uri", "buffers")?, buffers.bytes(i)) else {
-                continue;
-            };
-            let form = uri::form(address);
+            let Some(bytes) = buffers.bytes(i) else { continue };
+            let form = json::string(buffer, "uri", "buffers")?.map(uri::form);
             let Value::Object(entry) = &mut self.document.array_mut("buffers")?[i] else { continue };
             if i == 0 {
                 entry.shift_remove("uri");
                 bin = Some(bytes.to_vec());
-            } else if form != uri::Form::Data {
+            } else if form != Some(uri::Form::Data) {
                 entry.insert("uri".to_owned(), json!(data_uri(bytes)));
             }
         }
@@ -169,6 +178,18 @@ impl Package {
         Ok(())
     }
 
+    /// Buffers with bytes but without an address (they were files and have changed) become files.
+    fn write_homeless(&mut self, buffers: &Buffers) -> Result<(), WriteError> {
+        let inside = self.document.bin.is_some();
+        for (i, buffer) in self.document.array("buffers")?.iter().enumerate() {
+            let known = (i == 0 && inside) || self.written.iter().any(|written| written.index == i);
+            if let Some(bytes) = buffers.bytes(i).filter(|_| buffer.get("uri").is_none() && !known) {
+                self.written.push(NewBuffer { index: i, behind: 0, bytes: bytes.to_vec() });
+            }
+        }
+        Ok(())
+    }
+
     /// Files that are now inside the document need not be copied.
     fn forget_unused(&mut self) {
         let dependencies = std::mem::take(&mut self.dependencies);
@@ -184,13 +205,13 @@ impl Package {
     pub fn finish(mut self, stem: &str, added: Option<NewBuffer>, buffers: &Buffers) -> Result<Files, WriteError> {
         // The BIN chunk of a GLB that became a `.gltf`, and the levels behind it, are one file.
         let hosted = added.as_ref().filter(|buffer| 0 < buffer.behind).map(|buffer| buffer.index);
-        let ending = if self.written.iter().any(|w| Some(w.index) == hosted) { "bin" } else { "lod.bin" };
+        let ending = if self.written.iter().any(|w| Some(w.index) == hosted) { self.ending } else { "lod.bin" };
         let added = added.map(|buffer| self.join(buffer, buffers));
         let mut taken: BTreeSet<String> =
             self.dependencies.iter().filter_map(|d| Some(d.path.file_name()?.to_str()?.to_lowercase())).collect();
         let mut beside = Vec::new();
         for buffer in std::mem::take(&mut self.written) {
-            beside.push(self.address(buffer, stem, "bin", &mut taken)?);
+            beside.push(self.address(buffer, stem, self.ending, &mut taken)?);
         }
         if let Some(buffer) = added {
             if self.keeps_buffers_inside()? {
@@ -254,7 +275,7 @@ impl Files {
     }
 }
 
-fn data_uri(bytes: &[u8]) -> String {
+pub(super) fn data_uri(bytes: &[u8]) -> String {
     let mut text = "data:application/octet-stream;base64,".to_owned();
     base64::engine::general_purpose::STANDARD.encode_string(bytes, &mut text);
     text

@@ -3,6 +3,7 @@
 //! A sub-mesh is the smallest group of a mesh's primitives that share border vertices: simplified together, no crack
 //! can open between them; apart, each can be found again elsewhere. Does no I/O.
 
+pub mod alike;
 pub mod borders;
 pub mod instances;
 pub mod inventory;

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ALGORITHM_VERSION, EMIT_VERSION, FORMAT_VERSION, Manifest, ManifestWriter};
 use crate::config::{
-    ChainSettings, EmitSettings, LevelTarget, Metric, SceneSettings, Screen, SimplifySettings, Weights,
+    ChainSettings, EmitSettings, LevelTarget, Metric, Recover, SceneSettings, Screen, SimplifySettings, Weights,
 };
 use crate::mesh::Mesh;
 use crate::mesh::hash::MeshHash;
@@ -57,7 +57,7 @@ impl Manifest for SequenceJob<'_> {
 impl Manifest for SceneSettings {
     fn write(&self, to: &mut dyn ManifestWriter) {
         // `skip` decides whether there is an output at all.
-        let Self { skip: _, min_triangles, simplify, chain, emit, appearance } = self;
+        let Self { skip: _, min_triangles, simplify, chain, emit, appearance, instances } = self;
         to.integer("format_version", FORMAT_VERSION.into());
         to.integer("algorithm_version", ALGORITHM_VERSION.into());
         to.integer("emit_version", EMIT_VERSION.into());
@@ -71,6 +71,12 @@ impl Manifest for SceneSettings {
         to.flag("record_looks", appearance.record);
         if appearance.record || self.looks_decide() {
             to.integer("look_size", appearance.size.into());
+        }
+        if instances.recover != Recover::None {
+            to.group("instances", |to| {
+                to.text("recover", instances.recover.name());
+                to.number("tolerance", instances.tolerance);
+            });
         }
     }
 }

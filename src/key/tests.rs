@@ -41,7 +41,7 @@ const LEVELS: &[&str] = &["chain", "scene"];
 const SCENE: &[&str] = &["scene"];
 
 /// Every setting of a scene, another value for it, and the keys that it must change.
-const CASES: [(&str, &[&str], &str); 25] = [
+const CASES: [(&str, &[&str], &str); 26] = [
     (
         "simplify.metric = 'qem'",
         ALL,
@@ -86,6 +86,11 @@ const CASES: [(&str, &[&str], &str); 25] = [
         "simplify.metric = 'auto'",
         ALL,
         "simplify.metric: its -> auto; simplify.candidates: (none) -> 3; look_size: 64 -> 128",
+    ),
+    (
+        "instances = { recover = 'similar', tolerance = 1e-4 }",
+        SCENE,
+        "instances.recover: (none) -> similar; instances.tolerance: (none) -> 0.0001",
     ),
     ("format = 'glb'", SCENE, "format: source -> glb"),
     ("profile = 'unity'", SCENE, "profile: web -> unity"),
@@ -145,7 +150,14 @@ fn what_is_not_used_is_not_in_the_key() {
     for line in ["normal", "texcoord", "color"] {
         assert_eq!(effect("", &format!("simplify.{line} = 5"), bare).0, SCENE, "{line}");
     }
-    for line in ["jobs = 3", "cache = 'x'", "ignore_files = true", "exclude = ['x']", "simplify.seam = 0.3"] {
+    for line in [
+        "instances.tolerance = 1e-3",
+        "jobs = 3",
+        "cache = 'x'",
+        "ignore_files = true",
+        "exclude = ['x']",
+        "simplify.seam = 0.3",
+    ] {
         assert_eq!(effect("", line, MeshParts::ALL).0, [""; 0], "{line}");
     }
     assert_eq!(effect("simplify.normal = 0", "simplify.normal = -0.0", MeshParts::ALL), (vec![], String::new()));

@@ -51,8 +51,10 @@ fn totals(scenes: &[SceneRecord], distinct: usize) -> Totals {
         meshes_found: meshes().map(|mesh| mesh.pieces.len() as u64).sum(),
         meshes_distinct: distinct as u64,
         instances: meshes().map(|mesh| mesh.instances).sum(),
+        instances_found: meshes().filter(|mesh| mesh.instance_of.is_some()).count() as u64,
+        instances_recovered: meshes().filter(|mesh| mesh.is_recovered()).count() as u64,
         triangles_drawn: (0..=targets).map(|number| at(number, |mesh| mesh.instances)).collect(),
-        triangles_stored: (0..=targets).map(|number| at(number, |_| 1)).collect(),
+        triangles_stored: (0..=targets).map(|number| at(number, |mesh| u64::from(!mesh.is_recovered()))).collect(),
         bytes_in: scenes.iter().map(|scene| scene.bytes_in).sum(),
         bytes_out: scenes.iter().map(|scene| scene.bytes_out).sum(),
     }

@@ -17,6 +17,7 @@ pub use table::{columns, percent, summary_table};
 
 use crate::compare::SurfaceDistance;
 use crate::config::{LevelTarget, SceneSettings};
+use crate::identify::alike::{Kind, Residual};
 use crate::mesh::hash::MeshHash;
 
 /// Version of the record. A reader refuses a greater one; added fields do not raise it, changed meanings do.
@@ -60,10 +61,16 @@ pub struct Totals {
     pub meshes_distinct: u64,
     /// Nodes with a mesh in all scenes.
     pub instances: u64,
+    /// Meshes that were found to be instances of others of their file.
+    #[serde(default)]
+    pub instances_found: u64,
+    /// Those among them that the outputs have as instances.
+    #[serde(default)]
+    pub instances_recovered: u64,
     /// Triangles drawn when every instance shows its level for the target `k`; `[0]` is the source. An instance
     /// without a level for that target shows the one before.
     pub triangles_drawn: Vec<u64>,
-    /// The same with every mesh of a file counted once, however many nodes show it.
+    /// The same with every mesh of a file counted once, however many nodes show it; recovered instances are no meshes.
     pub triangles_stored: Vec<u64>,
     /// Bytes of the source files: scenes and their buffers, not images.
     pub bytes_in: u64,
@@ -168,6 +175,9 @@ pub struct MeshRecord {
     /// declare.
     #[serde(default)]
     pub copy_of: Option<u64>,
+    /// An earlier mesh that it is an instance of, though the file does not say so. Looked for where `[instances]` asks for it.
+    #[serde(default)]
+    pub instance_of: Option<InstanceRecord>,
     /// Triangles of the source.
     pub triangles: u64,
     /// Vertices of the source.
@@ -180,6 +190,21 @@ pub struct MeshRecord {
     pub levels: Vec<LevelRecord>,
     /// What a person should know, e.g. why there are no levels, or an extension that levels do not carry.
     pub notes: Vec<String>,
+}
+
+/// A mesh that is another one of its file but for the order of its data, a motion, a uniform scale or a mirror.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct InstanceRecord {
+    /// Index of that mesh: the first of the group.
+    pub mesh: u64,
+    /// What it takes to make one of the other.
+    pub kind: Kind,
+    /// From that mesh to this one.
+    pub scale: f64,
+    /// What is left between this mesh and the one rebuilt from that mesh.
+    pub residual: Residual,
+    /// Why the output has it as a mesh with bytes of its own all the same. Absent where it shows that mesh's.
+    pub kept: Option<String>,
 }
 
 /// A sub-mesh in its place in a mesh: the smallest group of primitives that share border vertices.
@@ -274,6 +299,11 @@ impl From<crate::lod::Stop> for Stop {
 }
 
 impl MeshRecord {
+    /// Does the output have it as an instance of another mesh?
+    pub fn is_recovered(&self) -> bool {
+        self.instance_of.as_ref().is_some_and(|instance| instance.kept.is_none())
+    }
+
     /// What is shown for a target (from 1): its level, or the level before if it has none; `None` is the source.
     pub fn level_for(&self, number: u64) -> Option<&LevelRecord> {
         self.levels.iter().take_while(|level| level.number <= number).last()

@@ -65,6 +65,14 @@ fn figures(report: &Report, summary: &Summary, wall: Duration) -> String {
             format!("{}{}", bytes(totals.bytes_out), change(totals.bytes_in, totals.bytes_out)),
         ],
     ];
+    if totals.instances_found > 0 {
+        let worst = meshes(report).filter(|mesh| mesh.is_recovered()).filter_map(|mesh| mesh.instance_of.as_ref());
+        let worst = worst.map(|instance| instance.residual.worst()).fold(0.0, f64::max);
+        let residual =
+            if totals.instances_recovered > 0 { format!("; residual up to {worst:.1e}") } else { String::new() };
+        let (found, recovered) = (count(totals.instances_found), count(totals.instances_recovered));
+        rows.push(vec!["instances".to_owned(), format!("{recovered} recovered of {found} found{residual}")]);
+    }
     let looks = Duration::from_millis(summary.looks_milliseconds);
     if !looks.is_zero() && looks <= wall {
         let share = looks.as_secs_f64() / wall.as_secs_f64();

@@ -5,16 +5,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::recover::Instance;
 use super::wave::ReadScene;
 use crate::appearance::images::ImageFacts;
 use crate::gltf::scene::{Scene, SourceMesh};
 use crate::identify::SubMesh;
+use crate::identify::alike::Match;
 use crate::lod::{Chain, ChainLevel};
 use crate::mesh::hash::MeshHash;
 use crate::mesh::{Level, LevelVertices};
 use crate::plan::MeshPlan;
 use crate::report::{
-    ImageRecord, LevelRecord, MeshRecord, PieceLevel, PieceRecord, Problem, SceneCosts, SceneRecord, Severity, Status,
+    ImageRecord, InstanceRecord, LevelRecord, MeshRecord, PieceLevel, PieceRecord, Problem, SceneCosts, SceneRecord,
+    Severity, Status,
 };
 use crate::scan::SceneFile;
 use crate::work::{Baked, LevelLook};
@@ -27,7 +30,7 @@ pub struct SceneFacts {
 }
 
 /// First byte of remembered facts; another one means another shape of [`SceneFacts`].
-const VERSION: u8 = 4;
+const VERSION: u8 = 5;
 
 /// For the index.
 pub fn to_bytes(facts: &SceneFacts) -> Vec<u8> {
@@ -99,6 +102,7 @@ pub fn meshes(scene: &ReadScene, baked: &Baked, switches: impl Fn(f64, &[f64]) -
             instances: scene.uses[source.index].instances,
             draw_calls: (scene.uses[source.index].nodes * source.primitives.len()) as u64,
             copy_of: copies[source.index],
+            instance_of: scene.instances.get(&source.index).map(instance),
             triangles: source.triangles() as u64,
             vertices: source.triangle_primitives().map(|(_, p)| p.count as u64).sum(),
             radius,
@@ -113,6 +117,17 @@ pub fn meshes(scene: &ReadScene, baked: &Baked, switches: impl Fn(f64, &[f64]) -
         }
     };
     scene.scene.meshes.iter().map(record).collect()
+}
+
+fn instance(instance: &Instance) -> InstanceRecord {
+    let Match { mesh: _, of, kind, by, residual } = &instance.found;
+    InstanceRecord {
+        mesh: *of as u64,
+        kind: *kind,
+        scale: by.scale,
+        residual: *residual,
+        kept: instance.kept.map(str::to_owned),
+    }
 }
 
 /// For each mesh, an earlier one with the same geometry that is kept in other bytes. Meshes that differ by their

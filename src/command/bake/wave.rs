@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::Session;
 use super::record::{self, SceneFacts};
+use super::recover::{Instance, Recovered, recover};
 use super::survey::Todo;
 use crate::appearance::assemble;
 use crate::appearance::fingerprint::Fingerprints;
@@ -17,13 +18,14 @@ use crate::cache::{Bucket, Cache, Lookup};
 use crate::config::Format;
 use crate::emit::{Content, Emission, Emitted, EmittedFile, OutputFolder};
 use crate::gltf::dependencies::{Dependency, DependencyKind, dependencies};
-use crate::gltf::document::{Container, Document};
+use crate::gltf::document::{Container, Document, DocumentError};
 use crate::gltf::instancing;
 use crate::gltf::lod::{MeshLevel, MeshLevels, PrimitiveLevel, WriteError, add_levels, is_sealed, switches};
 use crate::gltf::package::Package;
 use crate::gltf::scene::{Scene, SourceMesh};
+use crate::gltf::share::Note;
 use crate::identify::instances::{MeshUse, mesh_uses};
-use crate::identify::{SubMesh, materials, sub_meshes};
+use crate::identify::{SubMesh, materials};
 use crate::index::{self, Seen};
 use crate::key::JobKey;
 use crate::lod::Chain;
@@ -62,6 +64,12 @@ pub struct ReadScene {
     pub scene: Scene,
     /// By mesh.
     pub sub_meshes: Vec<Vec<SubMesh>>,
+    /// Meshes that are others, moved, by mesh.
+    pub instances: BTreeMap<usize, Instance>,
+    /// Some of these are declared now: the document is not the source's.
+    is_changed: bool,
+    /// Of the search for them.
+    notes: Vec<Note>,
     /// By mesh: nodes that show it.
     pub uses: Vec<MeshUse>,
     images: Vec<ImageFacts>,
@@ -110,6 +118,9 @@ impl Session<'_> {
                     let meshes = scene.scene.meshes.iter().zip(&scene.sub_meshes);
                     scene.plans = meshes
                         .map(|(source, subs)| {
+                            if let Some(plan) = scene.shown_elsewhere(source.index) {
+                                return plan;
+                            }
                             let is_sealed = is_sealed(&scene.scene.document, source.index);
                             plan.add(source, subs, is_sealed, scene.looks[source.index].as_ref(), &scene.todo.settings)
                         })
@@ -224,6 +235,12 @@ impl ReadScene {
 }
 
 impl ReadScene {
+    /// The plan of a mesh whose nodes show the one that it is an instance of.
+    fn shown_elsewhere(&self, mesh: usize) -> Option<MeshPlan> {
+        let declared = self.instances.get(&mesh).is_some_and(|instance| instance.kept.is_none());
+        (declared && self.uses[mesh].nodes == 0).then_some(MeshPlan::Alone("its nodes show the mesh that it repeats"))
+    }
+
     /// Materials and textures. What is missing is told by the warnings of the scene's record.
     fn load_looks(&self) -> Arc<Looks> {
         assemble::looks(&self.scene, self.todo.file.path.parent().unwrap_or(Path::new("")))
@@ -273,15 +290,20 @@ fn read_scene(todo: Todo) -> Result<ReadScene, Failure> {
     if converted {
         beside = see(base, &scene.dependencies);
     }
-    let sub_meshes: Vec<Vec<SubMesh>> = scene.meshes.par_iter().map(sub_meshes).collect();
-    let uses = mesh_uses(&scene.document)
-        .map_err(|error| failure(format!("failed to read `{}`: {error}", file.path.display()), error.hint()))?;
+    let refused =
+        |error: DocumentError| failure(format!("failed to read `{}`: {error}", file.path.display()), error.hint());
     let buffers: u64 = (scene.dependencies.iter())
         .filter(|d| d.kind == DependencyKind::Buffer)
         .filter_map(|d| beside.iter().find(|(path, _)| *path == d.path)?.1.seen.as_ref())
         .map(|seen| seen.stat.size)
         .sum();
+    let Recovered { scene, sub_meshes, instances, is_changed, notes } =
+        recover(scene, &todo.settings.instances, base).map_err(refused)?;
+    let uses = mesh_uses(&scene.document).map_err(refused)?;
     Ok(ReadScene {
+        instances,
+        is_changed,
+        notes,
         looks: mesh_looks(&scene, &sub_meshes, &beside, &todo),
         images: image_facts(&scene.document, &scene.buffers, base),
         uses,
@@ -343,6 +365,8 @@ fn write_scene(scene: ReadScene, baked: &Baked, output: &OutputFolder, root: &Pa
     let settings = &scene.todo.settings.emit.clone();
     let relative = scene.todo.file.relative.clone();
     let levels = levels(&scene, &baked.chains);
+    let is_changed = scene.is_changed || is_obj(&scene.todo.file.path);
+    let mut notes = scene.notes.clone();
     let mut record = SceneRecord {
         path: relative.clone(),
         status: Status::Baked,
@@ -382,12 +406,12 @@ fn write_scene(scene: ReadScene, baked: &Baked, output: &OutputFolder, root: &Pa
     let batches = instancing::batches(&document, &buffers).map_err(|error| refused(error.into()))?;
     let mut package = Package::new(document, &buffers, dependencies.clone(), container).map_err(refused)?;
     let added = add_levels(&mut package.document, &levels, &batches, settings).map_err(refused)?;
-    let mut notes = package.notes();
+    notes.extend(package.notes());
     notes.extend(added.notes);
     if added.groups == 0 {
         record.status = Status::Copied;
     }
-    let content = if added.groups == 0 && !package.is_converted() && !is_obj(&todo.file.path) {
+    let content = if added.groups == 0 && !package.is_converted() && !is_changed {
         Content::AsSource { copied: dependencies }
     } else {
         Content::Files(package.finish(&stem, added.buffer, &buffers).map_err(refused)?)

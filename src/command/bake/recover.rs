@@ -1,0 +1,86 @@
+//! Instances that nobody declared: finds them in a scene that was read, and makes it the scene that declares them.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use crate::config::{InstanceSettings, Recover};
+use crate::gltf::document::DocumentError;
+use crate::gltf::read::from_document;
+use crate::gltf::scene::Scene;
+use crate::gltf::share::{Copy, Note, Sharing, share};
+use crate::identify::alike::{Kind, Match, find};
+use crate::identify::{SubMesh, sub_meshes};
+
+/// A mesh that is another one, moved.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// How it was found.
+    pub found: Match,
+    /// Why its own bytes are written all the same.
+    pub kept: Option<&'static str>,
+}
+
+/// A scene with the instances that were found in it.
+pub struct Recovered {
+    /// The source's document if nothing was changed.
+    pub scene: Scene,
+    /// Of `scene`, by mesh.
+    pub sub_meshes: Vec<Vec<SubMesh>>,
+    /// By mesh.
+    pub instances: BTreeMap<usize, Instance>,
+    /// Something was changed.
+    pub is_changed: bool,
+    /// What a user should know.
+    pub notes: Vec<Note>,
+}
+
+/// Finds instances and declares those that the settings ask for. `base` is the scene's folder.
+pub fn recover(scene: Scene, settings: &InstanceSettings, base: &Path) -> Result<Recovered, DocumentError> {
+    let subs: Vec<Vec<SubMesh>> = scene.meshes.par_iter().map(sub_meshes).collect();
+    let mut out =
+        Recovered { scene, sub_meshes: subs, instances: BTreeMap::new(), is_changed: false, notes: Vec::new() };
+    if settings.recover == Recover::None {
+        return Ok(out);
+    }
+    if let Some(name) = Sharing::unknown_extension(&out.scene.document) {
+        let text = format!("`{name}` might refer to geometry, so no instances are looked for");
+        out.notes.push(Note { place: "extensionsUsed".to_owned(), text, count: 1 });
+        return Ok(out);
+    }
+    let sharing = Sharing::new(&out.scene.document)?;
+    let found = find(&out.scene.meshes, &out.sub_meshes, settings.tolerance, &|mesh| sharing.is_eligible(mesh));
+    let mut copies = Vec::new();
+    for found in found {
+        let copy = Copy { mesh: found.mesh, of: found.of, by: found.by };
+        let kept = refused(found.kind, settings.recover).or_else(|| sharing.obstacle(&copy));
+        if kept.is_none() {
+            copies.push(copy);
+        }
+        out.instances.insert(found.mesh, Instance { found, kept });
+    }
+    if copies.is_empty() {
+        return Ok(out);
+    }
+    let Scene { mut document, buffers, warnings, .. } = out.scene;
+    let shared = share(&mut document, &buffers, &copies)?;
+    // What was odd in the source is told once, as it stood there.
+    let scene = Scene { warnings, ..from_document(document, shared.buffers, base)? };
+    let sub_meshes = scene.meshes.par_iter().map(sub_meshes).collect();
+    Ok(Recovered { scene, sub_meshes, instances: out.instances, is_changed: true, notes: shared.notes })
+}
+
+fn refused(kind: Kind, recover: Recover) -> Option<&'static str> {
+    let least = match kind {
+        Kind::Exact | Kind::Reordered => Recover::Exact,
+        Kind::Rigid => Recover::Rigid,
+        Kind::Similar => Recover::Similar,
+        Kind::Mirrored => Recover::Mirrored,
+    };
+    let words = match kind {
+        Kind::Mirrored => "`recover` does not ask for mirrored ones",
+        _ => "`recover` does not ask for it",
+    };
+    (recover < least).then_some(words)
+}

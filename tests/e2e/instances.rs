@@ -1,0 +1,94 @@
+//! Instances that no file declares, recovered by a bake.
+
+use serde_json::{Value, json};
+
+use crate::scene::{Scene, Shape};
+use crate::space::Space;
+
+/// Two hills, the second moved in its own space, on five nodes; the last one has another material.
+fn hills() -> Scene {
+    let mut scene = Scene::new();
+    let hill = scene.mesh("hill", &Shape::grid(12, 0.2));
+    let moved = scene.mesh("moved", &Shape::grid(12, 0.2).shifted(3.0));
+    let painted = scene.mesh_with_material("painted", &Shape::grid(12, 0.2).shifted(5.0), 1);
+    for (i, mesh) in [hill, moved, moved, painted].into_iter().enumerate() {
+        scene.node(&format!("node {i}"), mesh, [0.0, i as f32, 0.0]);
+    }
+    scene
+}
+
+fn space(settings: &str) -> Space {
+    let space = Space::new();
+    space.write("pipeline.toml", format!("input = 'scenes'\noutput = 'out'\n{settings}\n[[lod]]\nratio = 0.5\n"));
+    space.write("scenes/hills.glb", hills().glb());
+    let (text, buffer) = hills().gltf_beside("hills.bin");
+    space.write("scenes/hills.gltf", text);
+    space.write("scenes/hills.bin", buffer);
+    space
+}
+
+const RECOVER: &str = "[instances]\nrecover = 'rigid'";
+
+fn length(space: &Space, name: &str) -> usize {
+    space.read(name).len()
+}
+
+#[test]
+fn moved_copies_become_nodes_of_the_first_and_their_bytes_go() {
+    let (with, without) = (space(RECOVER), space(""));
+    let told = with.run_fine(&["pipeline.toml"]);
+    without.run_fine(&["pipeline.toml"]);
+    assert!(told.stderr.contains("4 recovered of 4 found"), "{}", told.stderr);
+    assert!(length(&with, "out/hills.glb") * 2 < length(&without, "out/hills.glb"));
+    let document = with.json("out/hills.gltf");
+    let buffers: Vec<&str> =
+        document["buffers"].as_array().unwrap().iter().map(|buffer| buffer["uri"].as_str().unwrap()).collect();
+    assert_eq!(buffers, ["hills.mesh.bin", "hills.lod.bin"]);
+    assert!(length(&with, "out/hills.mesh.bin") * 3 <= length(&with, "scenes/hills.bin") + 64);
+    assert!(!with.path("out/hills.bin").exists());
+    // The node stays, its mesh is two nodes below: the transform, then the levels.
+    let node = &document["nodes"][1];
+    assert_eq!(
+        (&node["name"], &node["translation"], node.get("mesh")),
+        (&json!("node 1"), &json!([0.0, 1.0, 0.0]), None)
+    );
+    let moved = &document["nodes"][node["children"][0].as_u64().unwrap() as usize];
+    assert_eq!(moved["translation"], json!([3.0, 0.0, 0.0]));
+    let shown = &document["nodes"][moved["children"][0].as_u64().unwrap() as usize];
+    assert_eq!((&shown["mesh"], shown["extensions"]["MSFT_lod"]["ids"].as_array().unwrap().len()), (&json!(0), 1));
+    // Another material: a mesh of its own over the first one's accessors.
+    assert_eq!(
+        document["meshes"][2]["primitives"][0]["attributes"],
+        document["meshes"][0]["primitives"][0]["attributes"]
+    );
+    assert_eq!(document["meshes"][2]["primitives"][0]["material"], 1);
+    let meshes = with.json("out/report.json")["scenes"][0]["meshes"].clone();
+    let found: Vec<&Value> = meshes.as_array().unwrap().iter().map(|mesh| &mesh["instance_of"]).collect();
+    assert_eq!(
+        (found[0], &found[1]["mesh"], &found[1]["kind"], &found[1]["kept"]),
+        (&Value::Null, &json!(0), &json!("rigid"), &Value::Null)
+    );
+    assert!(found[2]["residual"]["position"].as_f64().unwrap() < 1e-6);
+}
+
+#[test]
+fn what_is_not_asked_for_is_told_and_left() {
+    let (exact, none) = (space("[instances]\nrecover = 'exact'"), space(""));
+    let told = exact.run_fine(&["pipeline.toml"]);
+    none.run_fine(&["pipeline.toml"]);
+    assert!(told.stderr.contains("0 recovered of 4 found"), "{}", told.stderr);
+    for name in ["out/hills.glb", "out/hills.gltf", "out/hills.bin", "out/hills.lod.bin"] {
+        assert_eq!(exact.read(name), none.read(name), "{name}");
+    }
+    let kept = exact.json("out/report.json")["scenes"][0]["meshes"][1]["instance_of"]["kept"].clone();
+    assert_eq!(kept, "`recover` does not ask for it");
+}
+
+#[test]
+fn the_same_bytes_with_any_number_of_threads_and_nothing_to_do_after_it() {
+    let (one, many) = (space(RECOVER), space(RECOVER));
+    one.run_fine(&["pipeline.toml", "--jobs", "1"]);
+    many.run_fine(&["pipeline.toml", "--jobs", "4"]);
+    assert_eq!(one.files("out"), many.files("out"));
+    assert!(one.run_fine(&["pipeline.toml"]).stderr.contains("no work"));
+}
