@@ -187,7 +187,8 @@ fn planted_instances_are_found_and_nothing_else() {
         plant(moved(mesh, &Similarity::IDENTITY, Some(&mut chance)), true);
         for mirror in [false, true] {
             for reordered in [false, true] {
-                let by = chance.similarity(ball, if mirror { scale(&mut chance) } else { 1.0 }, mirror);
+                let factor = if mirror { scale(&mut chance) } else { 1.0 };
+                let by = chance.similarity(ball, factor, mirror);
                 plant(moved(mesh, &by, reordered.then_some(&mut chance)), true);
                 let factor = scale(&mut chance);
                 let by = chance.similarity(ball, factor, mirror);

@@ -150,6 +150,11 @@ impl<'a> Accessor<'a> {
         }
     }
 
+    /// The elements as they are stored, without padding between them, sparse values put in.
+    pub(super) fn packed<'v>(&self, views: &'v Views<'_>) -> Result<Cow<'v, [u8]>, DocumentError> {
+        self.bytes(views, false)
+    }
+
     /// Where the packed elements stand, if there are any.
     fn run<'v>(&self, views: &'v Views<'_>) -> Result<Option<(View<'v>, Run)>, DocumentError> {
         let Some(view) = json::index(self.value, "bufferView", &self.place)? else { return Ok(None) };

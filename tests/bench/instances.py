@@ -2,7 +2,7 @@
 """What recovered instances save, beside other tools: meshes that are left, and bytes of scene and buffers, for each scene.
 
 No tool simplifies here: lodbake bakes without levels (`min_triangles` above all meshes), glTF-Transform runs `dedup` and then
-`instance`, gltfpack `-mi -noq -kn -km` (no quantisation, names and materials kept). Images are not counted. "draws" are the
+`instance`, gltfpack `-mi -noq -km` (no quantisation, materials kept; keeping names would turn `-mi` off). Images are not counted. "draws" are the
 nodes with a mesh, with all instances: they must stay as many.
 
     instances.py [--lodbake PATH] [--tools FOLDER_WITH_NODE_MODULES] [--recover KIND] FOLDER_OR_FILE..
@@ -60,7 +60,18 @@ def facts(path):
 def run(command):
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
     if done.returncode != 0:
-        sys.exit(f"{' '.join(map(str, command))}: exit code {done.returncode}\n{done.stderr}")
+        raise RuntimeError(f"{' '.join(map(str, command))}: exit code {done.returncode}\n{done.stderr}")
+
+
+def by_other(tool, program, source, work):
+    """The scene as another tool writes it."""
+    out = work / f"{tool}.glb"
+    if tool == "gltfpack":
+        run([program, "-i", source, "-o", out, "-mi", "-noq", "-km"])
+    else:
+        run([program, "dedup", source, work / "dedup.glb"])
+        run([program, "instance", work / "dedup.glb", out])
+    return out
 
 
 def lodbake(program, source, work, recover):
@@ -106,13 +117,11 @@ def main():
                 if not tools or not (tools / tool).exists():
                     others.append("")
                     continue
-                out = work / f"{tool}.glb"
-                if tool == "gltfpack":
-                    run([tools / tool, "-i", source, "-o", out, "-mi", "-noq", "-kn", "-km"])
-                else:
-                    run([tools / tool, "dedup", source, work / "dedup.glb"])
-                    run([tools / tool, "instance", work / "dedup.glb", out])
-                others.append(cell(out))
+                try:
+                    others.append(cell(by_other(tool, tools / tool, source, work)))
+                except RuntimeError as error:
+                    print(error, file=sys.stderr)
+                    others.append("fails")
             words = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
             row = [source.name, cell(source), cell(baked), words, f"{residual:.1e}", f"{seconds:.2f}", *others]
             print("| " + " | ".join(row) + " |", flush=True)

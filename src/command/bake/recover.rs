@@ -60,11 +60,11 @@ pub fn recover(scene: Scene, settings: &InstanceSettings, base: &Path) -> Result
         }
         out.instances.insert(found.mesh, Instance { found, kept });
     }
-    if copies.is_empty() {
-        return Ok(out);
-    }
-    let Scene { mut document, buffers, warnings, .. } = out.scene;
+    let Scene { mut document, buffers, meshes, dependencies, warnings } = out.scene;
     let shared = share(&mut document, &buffers, &copies)?;
+    if !shared.is_changed {
+        return Ok(Recovered { scene: Scene { document, buffers, meshes, dependencies, warnings }, ..out });
+    }
     // What was odd in the source is told once, as it stood there.
     let scene = Scene { warnings, ..from_document(document, shared.buffers, base)? };
     let sub_meshes = scene.meshes.par_iter().map(sub_meshes).collect();

@@ -5,11 +5,12 @@
 //!                      ──▶      └─ appended child: mesh r, the transform that takes r to k
 //! ```
 //!
-//! Without a transform N shows r itself. Where r looks different (materials, `extras`), k stays a mesh of its own over
+//! Accessors with the same content become one (`equal`). Without a transform N shows r itself. Where r looks different (materials, `extras`), k stays a mesh of its own over
 //! r's accessors. No entry of any array goes or changes its index: a mesh, accessor or buffer view that lost its bytes
 //! stands for r's. Does not know how it was found out that two meshes are alike.
 
 mod compact;
+mod equal;
 #[cfg(test)]
 mod tests;
 
@@ -158,11 +159,13 @@ fn is_plain(mesh: &Value) -> bool {
 pub struct Shared {
     /// The document's buffers, without the bytes that nothing needs any more.
     pub buffers: Buffers,
+    /// `false`: there was nothing to share, the document is as it was.
+    pub is_changed: bool,
     /// What was done differently.
     pub notes: Vec<Note>,
 }
 
-/// Writes `copies` (without an obstacle) as instances.
+/// Writes `copies` (without an obstacle) as instances, and keeps equal accessors once.
 pub fn share(document: &mut Document, buffers: &Buffers, copies: &[Copy]) -> Result<Shared, DocumentError> {
     let source = document.array("meshes")?.to_vec();
     let mut retired = Retired::default();
@@ -182,9 +185,12 @@ pub fn share(document: &mut Document, buffers: &Buffers, copies: &[Copy]) -> Res
     let moved = show(document, &shown)?;
     let mut notes = Notes::default();
     follow::follow(document, &moved, &mut notes)?;
+    let merged = equal::merge(document, buffers)?;
+    let is_changed = !copies.is_empty() || !merged.is_empty();
+    retired.accessors.extend(merged);
     let touched = retired.settle(document)?;
     let buffers = compact::compact(document, buffers, &touched)?;
-    Ok(Shared { buffers, notes: notes.into_vec() })
+    Ok(Shared { buffers, is_changed, notes: notes.into_vec() })
 }
 
 /// Members that say where a primitive's geometry is.
@@ -291,6 +297,9 @@ impl Retired {
             self.views.iter().filter(unused).map(|(&old, &new)| (old, new)).collect();
         let accessors = document.array_mut("accessors")?;
         for (&old, &new) in self.accessors.iter().filter(|(old, _)| !used.contains(old)) {
+            // What stands for it may itself have been merged.
+            let next = |new: &usize| self.accessors.get(new).copied().filter(|_| !used.contains(new));
+            let new = std::iter::successors(Some(new), next).last().unwrap_or(new);
             let mut entry = accessors[new].clone();
             let view = |accessor: &Value| index(accessor, "bufferView");
             if let (Some(old), Some(new)) = (view(&accessors[old]), view(&entry)) {

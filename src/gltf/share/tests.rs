@@ -168,3 +168,19 @@ fn one_view_of_many_meshes_shrinks() {
     assert_eq!(offsets, [0, 4, 0, 4, 32, 36]);
     assert_eq!(Buffers::load(&document, Path::new("")).unwrap().bytes(0), Some(expected.as_slice()));
 }
+
+#[test]
+fn equal_accessors_are_kept_once() {
+    let mut document = twice();
+    let buffers = Buffers::load(&document, Path::new("")).unwrap();
+    let after = share(&mut document, &buffers, &[]).unwrap();
+    assert!(after.is_changed);
+    let primitive = |mesh: usize| document.json["meshes"][mesh]["primitives"][0].clone();
+    // The twelve bytes of indices are equal, the positions are not.
+    assert_eq!((primitive(0)["indices"].clone(), primitive(1)["indices"].clone()), (json!(1), json!(1)));
+    assert_eq!(primitive(1)["attributes"]["POSITION"], 2);
+    assert_eq!(after.buffers.bytes(0).unwrap().len(), 128 - 8);
+    let nothing = share(&mut document, &after.buffers, &[]).unwrap();
+    assert!(!nothing.is_changed);
+    assert_eq!(nothing.buffers.bytes(0), after.buffers.bytes(0));
+}
