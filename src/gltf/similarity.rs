@@ -63,6 +63,12 @@ impl Similarity {
     }
 }
 
+/// The rotation that a quaternion of any length but 0 stands for; none for 0.
+pub fn rotation(q: DQuat) -> DQuat {
+    let length = q.length();
+    if 0.0 < length { q * (1.0 / length) } else { DQuat::IDENTITY }
+}
+
 fn single(value: f64) -> f64 {
     f64::from(value as f32)
 }
@@ -90,7 +96,7 @@ mod tests {
 
     #[test]
     fn what_is_written_is_what_was_meant() {
-        let rotation = DQuat::from_xyzw(0.1, 0.2, 0.3, 0.4).normalize();
+        let rotation = rotation(DQuat::from_xyzw(0.1, 0.2, 0.3, 0.4));
         let exact = Similarity { scale: 1.1, mirror: false, rotation, translation: DVec3::new(1.0, 2.0, 3.0) };
         let far = DVec3::new(1000.0, -2000.0, 500.0);
         let read = exact.as_read(far, exact.point(far));

@@ -46,7 +46,9 @@ pub(super) fn compact(
                 let Some((buffer, range)) = whole else { continue };
                 push(&mut dead, buffer, range.clone());
                 let spans: Vec<(usize, Range<usize>)> = spans(document, view, parts, range.start)?;
-                spans.iter().for_each(|(_, span)| push(&mut live, buffer, span.clone()));
+                for (_, span) in &spans {
+                    push(&mut live, buffer, span.clone());
+                }
                 shrunk.insert(i, spans);
             }
             _ => ranges.for_each(|(buffer, range)| push(&mut live, *buffer, range.clone())),

@@ -1,7 +1,7 @@
 //! The similarity that takes one set of points to another, and guesses at it from two places that stand out.
 
 use super::shape::{LOOSE, Place, Shape};
-use crate::gltf::similarity::Similarity;
+use crate::gltf::similarity::{self, Similarity};
 use glam::{DMat3, DQuat, DVec3};
 
 /// Guesses that are looked at, at most: beyond that a shape is so regular that one of the first would have fitted.
@@ -40,7 +40,7 @@ pub(super) fn fit(pairs: &[(DVec3, DVec3)], mirror: bool) -> Option<Similarity> 
         [xy - yx, zx + xz, yz + zy, zz - xx - yy],
     ];
     let [w, x, y, z] = greatest_eigenvector(matrix);
-    let rotation = upright(DQuat::from_xyzw(x, y, z, w).normalize());
+    let rotation = upright(similarity::rotation(DQuat::from_xyzw(x, y, z, w)));
     let scale = (to_size / from_size).sqrt();
     let translation = to_middle - rotation * (scale * from_middle);
     Some(Similarity { scale, mirror, rotation, translation })
@@ -75,8 +75,9 @@ fn greatest_eigenvector(mut m: [[f64; 4]; 4]) -> [f64; 4] {
                 for row in &mut m {
                     (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
                 }
-                for k in 0..4 {
-                    (m[p][k], m[q][k]) = (c * m[p][k] - s * m[q][k], s * m[p][k] + c * m[q][k]);
+                let rows = (m[p], m[q]);
+                for (k, (a, b)) in std::iter::zip(rows.0, rows.1).enumerate() {
+                    (m[p][k], m[q][k]) = (c * a - s * b, s * a + c * b);
                 }
                 for row in &mut vectors {
                     (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
@@ -134,11 +135,11 @@ fn frame<'s>(shape: &'s Shape<'_>) -> Option<[&'s Place; 2]> {
     best.filter(|(most, _)| 1e-3 < *most).map(|(_, second)| [first, second])
 }
 
-/// Orthonormal, by two directions.
-fn basis(a: DVec3, b: DVec3) -> DMat3 {
-    let x = a.normalize();
-    let z = x.cross(b).normalize();
-    DMat3::from_cols(x, z.cross(x), z)
+/// Orthonormal, by two directions, if they are two.
+fn basis(a: DVec3, b: DVec3) -> Option<DMat3> {
+    let x = a.try_normalize()?;
+    let z = x.cross(b).try_normalize()?;
+    Some(DMat3::from_cols(x, z.cross(x), z))
 }
 
 /// Similarities that might take `from` to `to`, near enough to tell which place is which.
@@ -163,8 +164,8 @@ pub(super) fn guesses<'s>(
     pairs.take(MOST_GUESSES).filter_map(move |(a, b, c, d)| {
         let middle = reflect(from.middle);
         let (a, b) = (reflect(a.position) - middle, reflect(b.position) - middle);
-        let turn = basis(c.position - to.middle, d.position - to.middle) * basis(a, b).transpose();
-        let rotation = DQuat::from_mat3(&turn).normalize();
+        let turn = basis(c.position - to.middle, d.position - to.middle)? * basis(a, b)?.transpose();
+        let rotation = similarity::rotation(DQuat::from_mat3(&turn));
         let translation = to.middle - rotation * (scale * middle);
         let guess = Similarity { scale, mirror, rotation, translation };
         probe(from, to, &guess).then_some(guess)
@@ -218,7 +219,7 @@ mod tests {
             (0..20).map(|i| DVec3::new(f64::from(i % 3), f64::from(i * i % 7), f64::from(i % 5))).collect();
         for mirror in [false, true] {
             for q in [[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0], [0.5, -0.5, 0.5, 0.5], [0.1, 0.7, -0.2, 0.3]] {
-                let rotation = DQuat::from_array(q).normalize();
+                let rotation = similarity::rotation(DQuat::from_array(q));
                 let meant = Similarity { scale: 2.5, mirror, rotation, translation: DVec3::new(9.0, -3.0, 0.5) };
                 let pairs: Vec<(DVec3, DVec3)> = points.iter().map(|&p| (p, meant.point(p))).collect();
                 let found = fit(&pairs, mirror).unwrap();

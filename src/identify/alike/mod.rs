@@ -184,7 +184,7 @@ fn settle(from: &Shape<'_>, to: &Shape<'_>, by: &Similarity, tolerance: f64) -> 
     let rotation = if turn <= NEARLY_NONE { DQuat::IDENTITY } else { by.rotation };
     let scale = if (by.scale - 1.0).abs() <= NEARLY_NONE { 1.0 } else { by.scale };
     let plain = checked(read(*by));
-    let simpler = Similarity { rotation, scale, ..*by };
+    let simpler = Similarity { scale, rotation, ..*by };
     let simple = if simpler == *by { None } else { checked(read(simpler)) };
     let (by, residual) = match (simple, plain) {
         (Some(simple), Some(plain)) if simple.1.worst() <= (2.0 * plain.1.worst()).max(NEARLY_NONE) => simple,

@@ -191,16 +191,18 @@ fn spots(points: &[[f32; 3]]) -> (Vec<DVec3>, Vec<u32>) {
     (spots, of)
 }
 
+/// The root of a set, halving the path to it.
+fn root(parents: &mut [u32], mut i: u32) -> u32 {
+    while parents[i as usize] != i {
+        parents[i as usize] = parents[parents[i as usize] as usize];
+        i = parents[i as usize];
+    }
+    i
+}
+
 /// Joins spots within `reach` of each other: the place of each spot, and the first spot of each place.
 fn join(spots: &[DVec3], grid: &Grid, reach: f64) -> (Vec<u32>, Vec<u32>) {
     let mut parents: Vec<u32> = (0..spots.len() as u32).collect();
-    fn root(parents: &mut [u32], mut i: u32) -> u32 {
-        while parents[i as usize] != i {
-            parents[i as usize] = parents[parents[i as usize] as usize];
-            i = parents[i as usize];
-        }
-        i
-    }
     for i in 0..spots.len() as u32 {
         let here = spots[i as usize];
         for other in grid.near(here, reach).filter(|&other| other < i) {

@@ -2,6 +2,7 @@
 
 use super::super::sub_meshes;
 use super::*;
+use crate::gltf::similarity;
 use crate::mesh::{Attribute, Format};
 
 /// A generator of numbers between 0 and 1.
@@ -15,7 +16,7 @@ impl Chance {
 
     fn rotation(&mut self) -> DQuat {
         let mut part = || self.next() - 0.5;
-        DQuat::from_xyzw(part(), part(), part(), part()).normalize()
+        similarity::rotation(DQuat::from_xyzw(part(), part(), part(), part()))
     }
 
     fn order(&mut self, count: usize) -> Vec<usize> {
@@ -214,6 +215,23 @@ fn how_vertices_are_split_does_not_count() {
     soup.count = soup.indices.len();
     soup.indices = (0..soup.count as u32).collect();
     assert_eq!(kinds(vec![rock(), soup]), [(1, 0, Kind::Reordered)]);
+}
+
+#[test]
+fn triangles_without_area_may_begin_anywhere() {
+    let mut chance = Chance(6);
+    let mut sliver = rock();
+    // A vertex once more: places are one, vertices two.
+    for attribute in &mut sliver.attributes {
+        attribute.values.extend_from_within(..3);
+    }
+    sliver.count += 1;
+    let twin = sliver.count as u32 - 1;
+    sliver.indices.extend([twin, 0, 5, 0, 7, twin, 9, twin, 0]);
+    let others: Vec<Primitive> =
+        (0..4).map(|_| moved(&sliver, &random(&mut chance, 1.0, false), Some(&mut chance))).collect();
+    let found = kinds(std::iter::once(sliver).chain(others).collect());
+    assert_eq!(found, (1..5).map(|i| (i, 0, Kind::Rigid)).collect::<Vec<_>>());
 }
 
 #[test]

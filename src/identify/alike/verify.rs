@@ -25,19 +25,13 @@ impl Residual {
     }
 }
 
-/// A triangle by the places of its corners, turned so that the least comes first, and its number.
+/// A triangle by the places of its corners, turned so that they read least, and its number.
 type Keyed = ([u32; 3], u32);
 
 fn keyed(places: [u32; 3], number: u32) -> Keyed {
     let [a, b, c] = places;
-    let key = if a <= b && a <= c {
-        [a, b, c]
-    } else if b <= c {
-        [b, c, a]
-    } else {
-        [c, a, b]
-    };
-    (key, number)
+    // Two corners may stand at one place, so the first corner alone does not tell.
+    ([a, b, c].min([b, c, a]).min([c, a, b]), number)
 }
 
 /// `None`: no match. `tolerance` is a fraction of the radius of `to`.
@@ -130,7 +124,8 @@ impl Compared<'_, '_> {
                 _ => return None,
             }
         }
-        if !(worst.worst() <= self.tolerance) {
+        // All values are finite: readers refuse others.
+        if self.tolerance < worst.worst() {
             return None;
         }
         let ((p, v), (q, w)) = (from.corners[mine], to.corners[theirs]);
