@@ -142,7 +142,9 @@ impl Replay<'_> {
             surface.place_all(batch, &mut placed);
             for (sample, placed) in batch.iter().zip(&placed).filter(|(_, placed)| placed.face != NONE) {
                 let wedges = wedges_of(placed.face);
-                values.iter_mut().for_each(|values| values.add(sample, placed, wedges));
+                for values in &mut values {
+                    values.add(sample, placed, wedges);
+                }
                 if let Some(system) = normals.get_mut(placed.face as usize) {
                     system.add(sample, placed);
                 }
