@@ -20,7 +20,7 @@ use crate::mesh::visible::visible;
 use crate::mesh::weld::NONE;
 use crate::quadric::{dot, scale};
 use normals::System;
-use samples::Samples;
+use samples::{Sample, Samples};
 use shape::Moves;
 use surface::{Placed, Surface};
 use values::Values;
@@ -130,15 +130,12 @@ impl Replay<'_> {
             })
             .collect();
         let mut normals = vec![System::default(); if fit.normals.is_some() { faces.len() } else { 0 }];
-        samples.visit(|first, batch| {
-            if values.is_empty() && normals.is_empty() {
-                return;
-            }
+        // Else no sample need be placed again.
+        let has_more = !values.is_empty() || !normals.is_empty();
+        let mut add = |first: usize, batch: &[Sample]| {
             placed.clear();
-            let hints = seen.get(first..first + batch.len());
-            let nowhere = Placed::NOWHERE;
-            placed
-                .extend((0..batch.len()).map(|i| hints.map_or(nowhere, |hints| Placed { face: hints[i], ..nowhere })));
+            let hint = |i: usize| Placed { face: seen.get(first + i).copied().unwrap_or(NONE), ..Placed::NOWHERE };
+            placed.extend((0..batch.len()).map(hint));
             surface.place_all(batch, &mut placed);
             for (sample, placed) in batch.iter().zip(&placed).filter(|(_, placed)| placed.face != NONE) {
                 let wedges = wedges_of(placed.face);
@@ -149,7 +146,10 @@ impl Replay<'_> {
                     system.add(sample, placed);
                 }
             }
-        });
+        };
+        if has_more {
+            samples.visit(&mut add);
+        }
         let solved: Vec<_> = values.iter().map(|values| (values.field, values.solve(wedges_of))).collect();
         for (field, solved) in solved {
             for (&wedge, solved) in wedges.iter().zip(solved) {
