@@ -3,14 +3,20 @@
 //! Pure: knows sub-meshes and sequences, not files, nodes or caches. The budget of a level is shared among the
 //! sub-meshes of its mesh by [`crate::allocate`].
 
+mod cutter;
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use serde::{Deserialize, Serialize};
 
 use crate::allocate::Allocation;
-use crate::distance::near::Sheet;
-use crate::mesh::{Attribute, Level, LevelPrimitive, LevelVertices, Mesh, Primitive};
+use crate::mesh::Level;
 use crate::simplify::progressive::Progressive;
-use crate::simplify::replay::refit::{Fit, Importance};
-use crate::simplify::replay::{CutPrimitive, Replay, Welded};
+
+pub use cutter::{Ground, Source};
+
+use cutter::{COARSE, Cutter, Finish};
 
 /// How coarse a level is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,7 +64,7 @@ pub struct ChainSettings {
 #[derive(Clone, Copy, Debug)]
 pub struct Part<'a> {
     /// The source.
-    pub mesh: &'a Mesh,
+    pub ground: &'a Ground<'a>,
     /// Its sequence; `None` leaves the sub-mesh as it is at every level.
     pub sequence: Option<&'a Progressive>,
     /// The sequence kept to source vertices ([`crate::metric::Placement::Subset`]) and the source's vertices can be
@@ -126,18 +132,23 @@ pub struct ChainLevel {
 
 /// Cuts the chain. Levels by appearance need a judge; without one they are left out.
 pub fn chain(parts: &[Part], settings: &ChainSettings, judge: Option<Judge>) -> Chain {
+    chain_sized(parts, settings, judge, LARGE)
+}
+
+fn chain_sized(parts: &[Part], settings: &ChainSettings, judge: Option<Judge>, large: usize) -> Chain {
     let sequences: Vec<&Progressive> = parts.iter().filter_map(|p| p.sequence).collect();
-    let fixed: usize = parts.iter().filter(|p| p.sequence.is_none()).map(|p| p.mesh.triangles()).sum();
-    let source: usize = parts.iter().map(|p| p.mesh.triangles()).sum();
-    let radius = crate::mesh::layout::frame(parts.iter().flat_map(|p| &p.mesh.primitives)).1;
+    let fixed: usize = parts.iter().filter(|p| p.sequence.is_none()).map(|p| p.ground.mesh.triangles()).sum();
+    let source: usize = parts.iter().map(|p| p.ground.mesh.triangles()).sum();
+    let radius = crate::mesh::layout::frame(parts.iter().flat_map(|p| &p.ground.mesh.primitives)).1;
     let allocation = Allocation::new(&sequences);
-    let welded: Vec<Option<Welded>> = parts.iter().map(|p| p.sequence.map(|_| Welded::new(p.mesh))).collect();
-    let mut cutters: Vec<Cutter> = parts
-        .iter()
-        .zip(&welded)
-        .filter_map(|(part, welded)| Some(Cutter::new(part, welded.as_ref()?, part.sequence?, settings)))
-        .collect();
-    let mut chain = Chain { levels: Vec::new() };
+    let sources: Vec<Option<Source>> =
+        parts.iter().map(|part| part.sequence.map(|_| Source::new(part.ground.mesh, part.ground.welded()))).collect();
+    let cutters = || -> Vec<Cutter> {
+        let each = parts.iter().zip(&sources);
+        each.filter_map(|(part, source)| Cutter::new(part, source.as_ref()?, settings)).collect()
+    };
+    let mut first = cutters();
+    let mut planned: Vec<Planned> = Vec::new();
     let mut triangles_before = source;
     for (number, &target) in settings.targets.iter().enumerate() {
         let (cuts, mut stop) = match target {
@@ -149,12 +160,12 @@ pub fn chain(parts: &[Part], settings: &ChainSettings, judge: Option<Judge>) -> 
             }
             Target::Appearance(limit) => {
                 let Some(judge) = judge else { continue };
-                let difference = |cuts: &[usize]| judge(&cut_all(parts, &mut cutters, cuts, Finish::Draft));
+                let difference = |cuts: &[usize]| judge(&cut_all(parts, &mut first, cuts, Finish::Draft));
                 let fine = |steps: &usize| {
                     (left(&sequences, &allocation.cuts_after(*steps)) + fixed) as f64 > COARSE * source as f64
                 };
-                let first = first_not(allocation.steps(), fine);
-                let cuts = cuts_by_looks(&allocation, limit, first, difference);
+                let start = first_not(allocation.steps(), fine);
+                let cuts = cuts_by_looks(&allocation, limit, start, difference);
                 let all = sequences.iter().zip(&cuts).all(|(s, &c)| c == s.steps.len());
                 (cuts, if all { Stop::NoLegalPair } else { Stop::LookLimit })
             }
@@ -163,7 +174,7 @@ pub fn chain(parts: &[Part], settings: &ChainSettings, judge: Option<Judge>) -> 
                     Target::ErrorOfMesh(fraction) => Target::Error(fraction * radius),
                     other => other,
                 };
-                let cuts: Vec<usize> = cutters.iter().map(|cutter| cutter.cut_within(target)).collect();
+                let cuts: Vec<usize> = first.iter().map(|cutter| cutter.cut_within(target)).collect();
                 let all = sequences.iter().zip(&cuts).all(|(s, &c)| c == s.steps.len());
                 (cuts, if all { Stop::NoLegalPair } else { Stop::ErrorLimit })
             }
@@ -172,33 +183,63 @@ pub fn chain(parts: &[Part], settings: &ChainSettings, judge: Option<Judge>) -> 
         if kept_one {
             stop = Stop::NoLegalPair;
         }
-        let left = left(&sequences, &cuts);
-        if triangles_before <= left + fixed {
-            continue;
+        let triangles = left(&sequences, &cuts) + fixed;
+        if triangles < triangles_before {
+            triangles_before = triangles;
+            planned.push(Planned { target: number, cuts, triangles, stop });
         }
-        triangles_before = left + fixed;
-        let level_parts = cut_all(parts, &mut cutters, &cuts, Finish::Whole);
-        let error = level_parts.iter().flatten().map(|level| level.error).fold(0.0, f64::max);
-        chain.levels.push(ChainLevel {
-            target: number,
-            triangles: left + fixed,
-            parts: level_parts,
-            error,
-            bound: sequences.iter().zip(&cuts).filter_map(|(s, &cut)| s.bound_after(cut)).reduce(f64::max),
-            stop,
-            recipe: None,
-        });
     }
-    chain
+    let one = |cutters: &mut [Cutter], planned: &Planned| -> ChainLevel {
+        let parts = cut_all(parts, cutters, &planned.cuts, Finish::Whole);
+        ChainLevel {
+            target: planned.target,
+            triangles: planned.triangles,
+            error: parts.iter().flatten().map(|level| level.error).fold(0.0, f64::max),
+            parts,
+            bound: sequences.iter().zip(&planned.cuts).filter_map(|(s, &cut)| s.bound_after(cut)).reduce(f64::max),
+            stop: planned.stop,
+            recipe: None,
+        }
+    };
+    if source <= large {
+        return Chain { levels: planned.iter().map(|planned| one(&mut first, planned)).collect() };
+    }
+    // Each thread goes down on its own and takes the next level that nobody has.
+    let next = AtomicUsize::new(0);
+    let done: Mutex<Vec<(usize, ChainLevel)>> = Mutex::new(Vec::new());
+    let down = |mut cutters: Vec<Cutter>| {
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            let Some(planned) = planned.get(number) else { break };
+            let level = one(&mut cutters, planned);
+            done.lock().expect("no thread panics with it").push((number, level));
+        }
+    };
+    let others = rayon::current_num_threads().min(planned.len()).saturating_sub(1);
+    rayon::scope(|scope| {
+        for _ in 0..others {
+            scope.spawn(|_| {
+                if next.load(Ordering::Relaxed) < planned.len() {
+                    down(cutters());
+                }
+            });
+        }
+        down(first);
+    });
+    let mut levels = done.into_inner().expect("no thread panics with it");
+    levels.sort_unstable_by_key(|(number, _)| *number);
+    Chain { levels: levels.into_iter().map(|(_, level)| level).collect() }
 }
 
-/// What a level is cut for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Finish {
-    /// To be looked at once: not measured. Its triangles are in their final order, for of faces that coincide the first is seen.
-    Draft,
-    /// To be kept.
-    Whole,
+/// Levels of meshes of more triangles than this are made side by side: each takes a copy of the sequence's state.
+const LARGE: usize = 200_000;
+
+/// A level that is wanted.
+struct Planned {
+    target: usize,
+    cuts: Vec<usize>,
+    triangles: usize,
+    stop: Stop,
 }
 
 /// One level of every part; `None` for those without a sequence.
@@ -282,191 +323,29 @@ fn keep_something(sequences: &[&Progressive], mut cuts: Vec<usize>, fixed: usize
     (cuts, true)
 }
 
-/// One sub-mesh on its way down.
-struct Cutter<'a> {
-    part: Part<'a>,
-    welded: &'a Welded,
-    sequence: &'a Progressive,
-    settings: &'a ChainSettings,
-    replay: Replay<'a>,
-    done: usize,
-    source: Source<'a>,
-    importance: Option<Importance>,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simplify::simplify;
+    use crate::simplify::tests::{BALANCED, torus};
 
-impl<'a> Cutter<'a> {
-    fn new(part: &Part<'a>, welded: &'a Welded, sequence: &'a Progressive, settings: &'a ChainSettings) -> Self {
-        Self {
-            part: *part,
-            welded,
-            sequence,
-            settings,
-            replay: Replay::new(part.mesh, welded, sequence),
-            done: 0,
-            source: Source::new(part.mesh, welded),
-            importance: None,
-        }
-    }
-
-    /// The coarsest cut whose measured error is within the limit: the error grows, though not strictly, so a search by
-    /// halves finds a cut whose successor (at the search's resolution) is over it.
-    fn cut_within(&self, target: Target) -> usize {
-        let limit = match target {
-            Target::ErrorOfRadius(fraction) => fraction * self.source.radius,
-            Target::Error(limit) => limit,
-            Target::Ratio(_) | Target::Triangles(_) | Target::ErrorOfMesh(_) | Target::Appearance(_) => return 0,
-        };
-        let (mut within, mut over) = (0, self.sequence.steps.len() + 1);
-        // Below this many steps a finer answer is not worth another measurement.
-        let resolution = (self.sequence.steps.len() / 1000).max(1);
-        while resolution < over - within {
-            let middle = within + (over - within) / 2;
-            let mut replay = Replay::new(self.part.mesh, self.welded, self.sequence);
-            replay.advance(middle.min(self.sequence.steps.len()));
-            let cut = replay.primitives();
-            let error = if cut.iter().all(|c| c.indices.is_empty()) {
-                f64::INFINITY
-            } else {
-                self.source.deviation(&replay, &cut)
-            };
-            if error <= limit {
-                within = middle;
-            } else {
-                over = middle;
+    #[test]
+    fn levels_made_side_by_side_are_those_made_one_after_the_other() {
+        let mesh = torus(48, 32);
+        let sequence = simplify(&mesh, &BALANCED);
+        let ground = Ground::new(&mesh);
+        let part =
+            |refit| Part { ground: &ground, sequence: Some(&sequence), shareable: false, refit, hold_borders: false };
+        // The last one is finer than the one before it: it is none, and the descent is not undone for it.
+        let targets = [0.7, 0.5, 0.25, 0.1, 0.05].map(Target::Ratio).into_iter().chain([Target::ErrorOfRadius(0.001)]);
+        let settings = ChainSettings { targets: targets.collect(), storage: Storage::Smallest, vertex_cache: true };
+        for refit in [Refit::Never, Refit::Coarse, Refit::Whole] {
+            let alone = chain_sized(&[part(refit)], &settings, None, usize::MAX);
+            assert_eq!(alone.levels.len(), 5);
+            for threads in [1, 2, 4] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+                assert!(alone == pool.install(|| chain_sized(&[part(refit)], &settings, None, 0)), "{threads} threads");
             }
         }
-        within.min(self.sequence.steps.len())
-    }
-
-    fn level(&mut self, cut: usize, finish: Finish) -> Level {
-        if cut < self.done {
-            // A later target asked for a finer cut of this part: start again.
-            self.replay = Replay::new(self.part.mesh, self.welded, self.sequence);
-        }
-        self.done = cut;
-        self.replay.advance(cut);
-        let mut cuts = self.replay.primitives();
-        let (left, whole) = (self.sequence.triangles_after(cut), self.sequence.triangles as usize);
-        let is_coarse = left as f64 <= whole as f64 * COARSE;
-        let hold_borders = self.part.hold_borders;
-        let fit = match self.part.refit {
-            Refit::Never => None,
-            Refit::Coarse if !is_coarse => None,
-            Refit::Shape => Some(Fit { shape: true, normals: None, hold_borders }),
-            Refit::Coarse | Refit::Whole => Some(Fit { shape: true, normals: Some(SAME_NORMAL), hold_borders }),
-        };
-        if let Some(fit) = fit {
-            let (mesh, welded) = (self.part.mesh, self.welded);
-            let importance = self.importance.get_or_insert_with(|| Importance::new(mesh, welded));
-            self.replay.refit(&mut cuts, importance, fit);
-        }
-        let sources = &self.part.mesh.primitives;
-        let error = match finish {
-            Finish::Draft => 0.0,
-            Finish::Whole => self.source.deviation(&self.replay, &cuts),
-        };
-        let primitive = |(index, cut)| self.primitive(index, &sources[index], cut);
-        let primitives = cuts.into_iter().enumerate().map(primitive).collect();
-        Level { primitives, error }
-    }
-
-    fn primitive(&self, index: usize, source: &Primitive, mut cut: CutPrimitive) -> LevelPrimitive {
-        if cut.indices.is_empty() {
-            return LevelPrimitive { indices: Vec::new(), vertices: LevelVertices::Source };
-        }
-        let count = cut.wedges.len();
-        let in_order = self.settings.vertex_cache;
-        if in_order {
-            cut.indices = meshopt::optimize_vertex_cache(&cut.indices, count);
-        }
-        if self.part.shareable && self.shares(source, &cut) {
-            let indices = cut.indices.iter().map(|&i| self.replay.origin(cut.wedges[i as usize])).collect();
-            return LevelPrimitive { indices, vertices: LevelVertices::Source };
-        }
-        if in_order {
-            order_by_use(&mut cut);
-        }
-        let vertices = self.replay.vertices(index, &cut);
-        LevelPrimitive { indices: cut.indices, vertices: LevelVertices::Own(vertices) }
-    }
-
-    fn shares(&self, source: &Primitive, cut: &CutPrimitive) -> bool {
-        let index_size = |vertices: usize| if vertices < usize::from(u16::MAX) { 2 } else { 4 };
-        let sets = source.targets.iter().flatten().chain(&source.attributes);
-        let stride: usize = sets.map(Attribute::row_bytes).sum();
-        let shared = cut.indices.len() * index_size(source.count);
-        let compact = cut.indices.len() * index_size(cut.wedges.len()) + cut.wedges.len() * stride;
-        match self.settings.storage {
-            Storage::Shared => true,
-            Storage::Compact => false,
-            Storage::Smallest => shared <= compact,
-        }
-    }
-}
-
-/// Share of the source's triangles below which levels are fitted: above it a face of the level has too few source faces
-/// to learn from.
-const COARSE: f64 = 0.3;
-
-/// Cosine of the angle within which the fitted normals of a vertex's faces stay one: 25°.
-const SAME_NORMAL: f64 = 0.906;
-
-/// Numbers vertices by first use, so that a GPU fetches them in order.
-fn order_by_use(cut: &mut CutPrimitive) {
-    let mut order = vec![u32::MAX; cut.wedges.len()];
-    let mut used = Vec::with_capacity(cut.wedges.len());
-    for index in &mut cut.indices {
-        let at = &mut order[*index as usize];
-        if *at == u32::MAX {
-            *at = used.len() as u32;
-            used.push(*index as usize);
-        }
-        *index = *at;
-    }
-    cut.wedges = used.iter().map(|&old| cut.wedges[old]).collect();
-    cut.normals = cut.normals.take().map(|normals| used.iter().map(|&old| normals[old]).collect());
-}
-
-/// Points measured in each direction: beyond this many a further one hardly ever raises the maximum.
-const MOST_SAMPLES: usize = 16384;
-
-/// A source that levels are measured against. Both are surfaces over the source's vertices.
-#[derive(Debug)]
-pub struct Source<'a> {
-    sheet: Sheet<'a>,
-    radius: f64,
-}
-
-impl<'a> Source<'a> {
-    /// The surface of `mesh`, which must be what `welded` was made from.
-    pub fn new(mesh: &Mesh, welded: &'a Welded) -> Self {
-        let radius = crate::mesh::layout::frame(&mesh.primitives).1;
-        Self { sheet: Sheet::new(&welded.positions, welded.triangles(mesh)), radius }
-    }
-
-    /// Largest distance between source and level: from source vertices to the level, and from the level's corners and
-    /// middles of triangles to the source.
-    pub fn deviation(&self, replay: &Replay, cuts: &[CutPrimitive]) -> f64 {
-        let triangles: Vec<[u32; 3]> = cuts.iter().flat_map(|cut| replay.triangles(cut)).collect();
-        if triangles.is_empty() {
-            // Nothing is left of it: as far off as it was large.
-            return 2.0 * self.radius;
-        }
-        let level = Sheet::new(replay.positions(), triangles);
-        let middle = |t: [u32; 3]| {
-            let p = level.corners(t);
-            [0, 1, 2].map(|i| (p[0][i] + p[1][i] + p[2][i]) / 3.0)
-        };
-        // This direction first: its hints are good, and what it finds spares the other one most of its searches.
-        let count = replay.positions().len();
-        let step = count.div_ceil(MOST_SAMPLES).max(1);
-        let vertices = (0..count as u32).step_by(step);
-        let there =
-            level.largest_distance(vertices.map(|vertex| (self.sheet.position(vertex), replay.root(vertex))), 0.0);
-        // A vertex that is left has kept its number.
-        let middles = level.triangles().iter().map(|&t| (middle(t), t[0]));
-        let corners = level.triangles().iter().map(|&t| (level.position(t[0]), t[0]));
-        let step = (level.triangles().len() * 2).div_ceil(MOST_SAMPLES).max(1);
-        self.sheet.largest_distance(middles.chain(corners).step_by(step), there)
     }
 }

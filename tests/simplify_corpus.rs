@@ -7,7 +7,7 @@ use std::path::Path;
 use corpus::{corpus, scenes};
 use lodbake::gltf::read;
 use lodbake::gltf::scene::SourceMesh;
-use lodbake::lod::{ChainSettings, Part, Refit, Storage, Target, chain};
+use lodbake::lod::{ChainSettings, Ground, Part, Refit, Storage, Target, chain};
 use lodbake::mesh::layout::AttributeScale;
 use lodbake::mesh::{Attribute, Level, LevelVertices, Mesh};
 use lodbake::metric::Placement;
@@ -48,8 +48,9 @@ fn check_all(file: &Path, meshes: &[SourceMesh]) -> usize {
 fn check(place: &str, mesh: &Mesh, settings: &Settings) {
     let sequence = simplify(mesh, settings);
     let shareable = settings.placement == Placement::Subset;
+    let ground = Ground::new(mesh);
     let part = Part {
-        mesh,
+        ground: &ground,
         sequence: Some(&sequence),
         shareable,
         refit: if shareable { Refit::Never } else { Refit::Coarse },

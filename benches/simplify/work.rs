@@ -1,6 +1,6 @@
 //! The three works that are compared, each on one mesh and in one thread.
 
-use lodbake::lod::{ChainSettings, Part, Refit, Source, Storage, Target, chain};
+use lodbake::lod::{ChainSettings, Ground, Part, Refit, Source, Storage, Target, chain};
 use lodbake::mesh::Mesh;
 use lodbake::mesh::layout::{AttributeScale, frame};
 use lodbake::metric::Placement;
@@ -88,8 +88,9 @@ fn own(mesh: &Mesh, memoryless: bool) -> Report {
     let began = now();
     let sequence = simplify(mesh, &settings);
     let simplified = now();
+    let ground = Ground::new(mesh);
     let part = Part {
-        mesh,
+        ground: &ground,
         sequence: Some(&sequence),
         shareable: false,
         refit: if settings.memoryless { Refit::Coarse } else { Refit::Never },

@@ -20,6 +20,8 @@ pub struct Blame {
     pub pixels: Vec<u32>,
     /// Sum over the pixels that no face is near to.
     pub nowhere: f64,
+    /// `d_RMS` of the candidate, as [`Reference::compare`] finds it.
+    pub rms: f64,
 }
 
 impl Reference {
@@ -41,8 +43,10 @@ impl Reference {
             .collect();
         let mut squares = vec![0u64; faces];
         let mut nowhere = 0u64;
+        let mut whole = 0u128;
         for view in views? {
             nowhere += view.nowhere;
+            whole += view.whole;
             for (face, square) in view.shares {
                 squares[face as usize] += square;
             }
@@ -52,6 +56,7 @@ impl Reference {
             squares: squares.into_iter().map(light).collect(),
             pixels: self.seen(faces),
             nowhere: light(nowhere),
+            rms: self.root_mean(whole),
         })
     }
 
@@ -77,6 +82,8 @@ const SCALE: u64 = 25;
 struct View {
     shares: Vec<(u32, u64)>,
     nowhere: u64,
+    /// All of it, unscaled.
+    whole: u128,
 }
 
 fn shares(reference: &Picture, candidate: &Picture, offsets: &[(i32, i32)]) -> View {
@@ -87,12 +94,13 @@ fn shares(reference: &Picture, candidate: &Picture, offsets: &[(i32, i32)]) -> V
         let inside = inside.filter(|(x, y)| (0..size).contains(x) && (0..size).contains(y));
         inside.map(|(x, y)| reference.faces[(y * size + x) as usize]).find(|face| *face != NO_FACE)
     };
-    let mut view = View { shares: Vec::new(), nowhere: 0 };
+    let mut view = View { shares: Vec::new(), nowhere: 0, whole: 0 };
     for (at, (p, q)) in reference.pixels.iter().zip(&candidate.pixels).enumerate() {
         let off = i64::from(luminance([p[0], p[1], p[2]]) - luminance([q[0], q[1], q[2]]));
         if off == 0 {
             continue;
         }
+        view.whole += (off * off) as u128;
         let square = (off * off) as u64 / SCALE;
         match near(at) {
             Some(face) => view.shares.push((face, square)),

@@ -97,8 +97,12 @@ impl Reference {
         self.sum_up(pairs.map(|(a, b)| difference(a, b, structure)).collect())
     }
 
+    /// Root of the mean over all pixels of all views, from the sum of squares in luminance's unit.
+    pub(super) fn root_mean(&self, squares: u128) -> f64 {
+        root_mean(squares, f64::from(self.size) * f64::from(self.size) * self.cameras.len() as f64)
+    }
+
     fn sum_up(&self, views: Vec<ViewDifference>) -> Comparison {
-        let pixels = f64::from(self.size) * f64::from(self.size) * views.len() as f64;
         let squares: u128 = views.iter().map(|v| v.squares).sum();
         let [either, one] = views.iter().fold([0, 0], |sum, v| [sum[0] + v.covered[0], sum[1] + v.covered[1]]);
         // The first of equals, so that the number does not depend on luck.
@@ -107,7 +111,7 @@ impl Reference {
         let weighted = views.iter().map(|v| Some(v.ssim? * v.similar as f64)).sum::<Option<f64>>();
         let ssim = weighted.map(|sum| if similar == 0 { 1.0 } else { sum / similar as f64 });
         Comparison {
-            rms: root_mean(squares, pixels),
+            rms: self.root_mean(squares),
             worst,
             silhouette: share(one, either),
             ssim: ssim.filter(|_| !views.is_empty()),

@@ -167,9 +167,9 @@ fn what_is_not_used_is_not_in_the_key() {
 #[test]
 fn the_key_is_the_same_on_every_machine() {
     let [sequence, chain, scene] = keys(&settings(""), MeshParts::ALL);
-    insta::assert_snapshot!(sequence, @"b9b917ff1ea3f43a810db398b14ab9cfa4a6618e6d5d8a20080f087639b30bbf");
-    insta::assert_snapshot!(chain, @"d9e9f2294cd723c6382c95aff47612e15dd6aa5f9e385b43c6d5e61b2f1e75f9");
-    insta::assert_snapshot!(scene, @"1795b62a79fe3f8333fe8adab13dbba8fea08c6c017d56fcafa3a4660f25a29c");
+    insta::assert_snapshot!(sequence, @"f79941682ed73a8b031fab0179930971d12b172857f7115da3a8a70c9eb87cae");
+    insta::assert_snapshot!(chain, @"d5d6e4f1c466b5baee12a9e328378c95bf928fcbb89451d611088a54da8cb17d");
+    insta::assert_snapshot!(scene, @"3d44ac5c0fb5eea9864f6fba51afb101c459af3e2e23b8889ef7f667098fcd49");
     assert_eq!(sequence.to_string().parse(), Ok(sequence));
     assert!("x".parse::<JobKey>().is_err());
 }

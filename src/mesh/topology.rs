@@ -2,10 +2,13 @@
 //!
 //! Positions and wedge values are in the unit frame of [`Layout`]. Knows no error metric; a contraction is done as told.
 
+mod part;
+
 use super::Mesh;
 use super::layout::Layout;
 use super::weld::{NONE, Weld, weld};
 use crate::quadric::{dot, sub};
+pub use part::{Merges, Part};
 
 /// What lies across a face's edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -35,6 +38,12 @@ pub struct Face {
 }
 
 impl Face {
+    /// Whether it is still there.
+    #[inline]
+    pub fn is_alive(&self) -> bool {
+        self.v[0] != NONE
+    }
+
     /// Corner of `vertex`, if the face has it.
     #[inline]
     pub fn corner(&self, vertex: u32) -> Option<usize> {
@@ -141,7 +150,7 @@ pub struct Topology {
     pub values: Vec<f32>,
     /// Values of one wedge.
     pub columns: usize,
-    /// Vertex of each wedge.
+    /// Vertex of each wedge; of one that is gone, some vertex or [`NONE`].
     pub wedge_vertex: Vec<u32>,
     /// Number of faces alive.
     pub alive: usize,
@@ -205,18 +214,21 @@ impl Topology {
         (topology, weld)
     }
 
+    /// Sets the lists of wedges of all vertices, in order.
     fn link_wedges(&mut self) {
-        for wedge in (0..self.wedge_vertex.len()).rev() {
+        self.first_wedge.fill(NONE);
+        for wedge in (0..self.wedge_vertex.len()).rev().filter(|&wedge| self.wedge_vertex[wedge] != NONE) {
             let vertex = self.wedge_vertex[wedge] as usize;
             self.next_wedge[wedge] = self.first_wedge[vertex];
             self.first_wedge[vertex] = wedge as u32;
         }
     }
 
+    /// Sets the rings of all vertices: corners in the order of the faces.
     fn link_rings(&mut self) {
         let vertices = self.positions.len();
         let mut len = vec![0u32; vertices];
-        for face in &self.faces {
+        for face in self.faces.iter().filter(|face| face.is_alive()) {
             for v in face.v {
                 len[v as usize] += 1;
             }
@@ -231,7 +243,7 @@ impl Topology {
         // Contractions append merged rings behind.
         let mut pool = Vec::with_capacity(total as usize + total as usize / 4);
         pool.resize(total as usize, Corner::default());
-        for (index, face) in self.faces.iter().enumerate() {
+        for (index, face) in self.faces.iter().enumerate().filter(|(_, face)| face.is_alive()) {
             for (at, v) in face.v.into_iter().enumerate() {
                 pool[fill[v as usize] as usize] = Corner::new(index, at);
                 fill[v as usize] += 1;
@@ -377,8 +389,7 @@ impl Topology {
             let (stays, goes) = (root(&done.merged, a), root(&done.merged, b));
             if stays != goes {
                 done.merged.push([stays, goes]);
-                let (a, b) = (self.chart_of(stays), self.chart_of(goes));
-                self.chart[a.max(b) as usize] = a.min(b);
+                self.join_charts(stays, goes);
             }
         }
         for vertex in [kept, gone] {
@@ -421,6 +432,11 @@ impl Topology {
         a == b || self.chart_of(a) == self.chart_of(b)
     }
 
+    fn join_charts(&mut self, one: u32, other: u32) {
+        let (a, b) = (self.chart_of(one), self.chart_of(other));
+        self.chart[a.max(b) as usize] = a.min(b);
+    }
+
     fn chart_of(&self, wedge: u32) -> u32 {
         let mut chart = self.chart[wedge as usize];
         while self.chart[chart as usize] != chart {
@@ -443,7 +459,7 @@ impl Topology {
                 let corner = self.ring_pool[at as usize];
                 let (next, previous) = (NEXT[corner.at()], PREVIOUS[corner.at()]);
                 let face = &mut self.faces[corner.face()];
-                if face.v[0] == NONE {
+                if !face.is_alive() {
                     // Dropped a moment ago, from the other side.
                 } else if face.v[next] == other || face.v[previous] == other {
                     let third = if face.v[next] == other { previous } else { next };
@@ -473,10 +489,14 @@ impl Topology {
         }
     }
 
-    /// Sets the kind of every edge; all are [`EdgeKind::Border`] before.
+    /// Sets the kind of every edge.
     fn classify_all(&mut self) {
+        self.kinds.fill([EdgeKind::Border; 3]);
         for index in 0..self.faces.len() {
             let face = self.faces[index];
+            if !face.is_alive() {
+                continue;
+            }
             for (edge, next) in NEXT.into_iter().enumerate() {
                 let (vertex, end) = (face.v[edge], face.v[next]);
                 let (mut faces, mut across) = (0, Corner::default());

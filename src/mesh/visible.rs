@@ -5,6 +5,8 @@
 //! from behind hide no room. Knows positions only. Same operations in the same order everywhere: no result depends on
 //! the machine.
 
+use rayon::prelude::*;
+
 use super::Mesh;
 use super::weld::NONE;
 use crate::mesh::layout::frame;
@@ -12,6 +14,9 @@ use crate::quadric::{cross, dot, sub};
 
 /// Directions, spread evenly.
 const VIEWS: usize = 14;
+
+/// Views that are drawn side by side.
+const AT_ONCE: usize = 2;
 
 /// Pixels a side: a pocket narrower than a hundredth of the mesh is no pocket.
 const SIZE: i32 = 192;
@@ -25,25 +30,29 @@ pub fn visible(mesh: &Mesh) -> Vec<f32> {
     let mut sums = vec![[0.0f32; 2]; points.len()];
     let mut seen = vec![0u32; faces.len()];
     let mut expected = vec![0.0f32; faces.len()];
-    let mut buffer = vec![(f32::INFINITY, NONE); (SIZE * SIZE) as usize];
-    let mut placed = vec![[0.0f32; 3]; points.len()];
     // The sphere fits with a pixel to spare.
     let to_pixels = (f64::from(SIZE) * 0.5 - 1.0) / radius;
-    for direction in directions() {
-        let (right, up) = across(direction);
-        for (to, point) in placed.iter_mut().zip(&points) {
+    let view = |direction: &[f64; 3]| {
+        let (right, up) = across(*direction);
+        let place = |point: &[f64; 3]| {
             let off = sub(*point, center);
             let half = f64::from(SIZE) * 0.5;
             let (x, y) = (dot(off, right) * to_pixels + half, dot(off, up) * to_pixels + half);
-            *to = [x as f32, y as f32, (-dot(off, direction) * to_pixels) as f32];
-        }
-        buffer.fill((f32::INFINITY, NONE));
-        for (number, face) in (0..).zip(&faces) {
-            let area = draw(face.map(|v| placed[v as usize]), number, &mut buffer);
-            expected[number as usize] += area;
-        }
-        for &(_, face) in buffer.iter().filter(|pixel| pixel.1 != NONE) {
-            seen[face as usize] += 1;
+            [x as f32, y as f32, (-dot(off, *direction) * to_pixels) as f32]
+        };
+        let placed: Vec<[f32; 3]> = points.iter().map(place).collect();
+        let mut buffer = vec![(f32::INFINITY, NONE); (SIZE * SIZE) as usize];
+        let areas = (0..).zip(&faces).map(|(number, face)| draw(face.map(|v| placed[v as usize]), number, &mut buffer));
+        (areas.collect::<Vec<f32>>(), buffer)
+    };
+    // A few at a time, for the memory; summed in their order, for the same bits with any number of threads.
+    for directions in directions().collect::<Vec<_>>().chunks(AT_ONCE) {
+        let views: Vec<_> = directions.par_iter().with_max_len(1).map(view).collect();
+        for (areas, buffer) in views {
+            expected.iter_mut().zip(areas).for_each(|(sum, area)| *sum += area);
+            for &(_, face) in buffer.iter().filter(|pixel| pixel.1 != NONE) {
+                seen[face as usize] += 1;
+            }
         }
     }
     for ((face, seen), expected) in faces.iter().zip(seen).zip(expected) {

@@ -17,9 +17,9 @@
 
 use glam::Vec4;
 
-use super::{ErrorMetric, Placement, Price};
+use super::{ErrorMetric, Parted, Placement, Price};
 use crate::mesh::layout::MOST_COLUMNS;
-use crate::mesh::topology::{Contraction, EdgeKind, NEXT, PREVIOUS, Topology, WedgePairs};
+use crate::mesh::topology::{Contraction, EdgeKind, NEXT, PREVIOUS, Part, Topology, WedgePairs};
 use crate::mesh::weld::NONE;
 use crate::quadric::{Form, cross, dot, dot3, lerp, scale, sub};
 
@@ -69,31 +69,21 @@ pub struct Its {
 }
 
 impl Its {
-    /// Prepares the quadrics of the whole surface.
     /// `importance`: by which the area of each face counts; none: all 1.
-    pub fn new(
-        surface: &Topology,
-        edges: EdgeWeights,
-        placement: Placement,
-        memoryless: bool,
-        importance: Vec<f32>,
-    ) -> Self {
-        let wedges = surface.wedge_vertex.len();
-        let mut out = Self {
+    pub fn new(edges: EdgeWeights, placement: Placement, memoryless: bool, importance: Vec<f32>) -> Self {
+        Self {
             edges,
             placement,
             memoryless,
-            columns: surface.columns,
-            forms: vec![Form::default(); surface.positions.len()],
-            means: vec![Vec4::ZERO; wedges * surface.columns],
-            weights: vec![0.0; wedges],
-            gradients: vec![Vec4::ZERO; surface.columns],
-            stale: vec![false; if memoryless { surface.positions.len() } else { 0 }],
+            columns: 0,
+            forms: Vec::new(),
+            means: Vec::new(),
+            weights: Vec::new(),
+            gradients: Vec::new(),
+            stale: Vec::new(),
             neighbours: Vec::new(),
             importance,
-        };
-        out.gather_all(surface);
-        out
+        }
     }
 
     #[inline]
@@ -108,7 +98,7 @@ impl Its {
 
     /// Builds the quadrics and mean fields of all vertices, each face once.
     fn gather_all(&mut self, surface: &Topology) {
-        for (id, face) in surface.faces.iter().enumerate() {
+        for (id, face) in surface.faces.iter().enumerate().filter(|(_, face)| face.is_alive()) {
             let Some(terms) = self.face(surface, id) else { continue };
             for (at, next) in NEXT.into_iter().enumerate() {
                 self.add_face(face.v[at], face.w[at], &terms);
@@ -480,6 +470,28 @@ impl ErrorMetric for Its {
                 self.stale[vertex as usize] = true;
             }
         }
+    }
+}
+
+impl Parted for Its {
+    fn begin(&mut self, surface: &Topology) {
+        let wedges = surface.wedge_vertex.len();
+        self.columns = surface.columns;
+        self.forms = vec![Form::default(); surface.positions.len()];
+        self.means = vec![Vec4::ZERO; wedges * surface.columns];
+        self.weights = vec![0.0; wedges];
+        self.gradients = vec![Vec4::ZERO; surface.columns];
+        self.stale = vec![false; if self.memoryless { surface.positions.len() } else { 0 }];
+        self.gather_all(surface);
+    }
+
+    fn part(&self, part: &Part) -> Self {
+        let importance = if self.importance.is_empty() {
+            Vec::new()
+        } else {
+            part.faces.iter().map(|&face| self.importance[face as usize]).collect()
+        };
+        Self::new(self.edges, self.placement, self.memoryless, importance)
     }
 }
 

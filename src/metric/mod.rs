@@ -19,7 +19,7 @@ pub mod tmpm;
 
 use serde::{Deserialize, Serialize};
 
-use crate::mesh::topology::{Contraction, Topology};
+use crate::mesh::topology::{Contraction, Part, Topology};
 
 /// Where the merged vertex goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -92,4 +92,13 @@ pub trait ErrorMetric {
 pub trait Staged: ErrorMetric {
     /// The geometric error alone, a length in the unit frame; `None` = refused.
     fn geometric_error(&self, surface: &Topology, a: u32, b: u32) -> Option<f64>;
+}
+
+/// A metric that can work on parts of a surface, side by side, and begin again on what they leave.
+pub trait Parted: ErrorMetric + Sync + Sized {
+    /// Builds the state from the surface as it is. Comes before all else.
+    fn begin(&mut self, surface: &Topology);
+
+    /// The metric for a part of the surface, which has yet to begin.
+    fn part(&self, part: &Part) -> Self;
 }

@@ -9,7 +9,7 @@ use crate::mesh::Mesh;
 use crate::mesh::layout::Layout;
 use crate::mesh::topology::{Contraction, Place, Topology};
 use crate::mesh::weld::Weld;
-use crate::metric::{CostUnit, Price};
+use crate::metric::CostUnit;
 
 /// The sequence. Positions are in object space, wedge values unscaled (as they will be written).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -80,6 +80,23 @@ impl Progressive {
             Some(last) => self.bounds.get(last).map(|&bound| f64::from(bound)),
         }
     }
+}
+
+/// One contraction as it was done, unit frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Taken {
+    /// Vertex that stays.
+    pub kept: u32,
+    /// Vertex that is gone.
+    pub gone: u32,
+    /// Where the vertex that stays is from now on.
+    pub position: [f64; 3],
+    /// Where that lies along the edge.
+    pub t: f32,
+    /// Whether that is one of the ends.
+    pub place: Place,
+    /// Its price.
+    pub cost: f64,
 }
 
 /// Writes the sequence while it happens.
@@ -157,31 +174,53 @@ impl Recorder {
         };
     }
 
-    /// Adds a contraction that has been done, with its wedge values set, and the metric's bound if it has one.
-    pub fn record(&mut self, surface: &Topology, done: &Contraction, price: &Price, bound: Option<f64>) {
+    /// Adds a contraction that has been done in `surface`, with its wedge values set, and the metric's bound if it has one.
+    /// `cost` is in the unit frame.
+    pub fn add(&mut self, surface: &Topology, done: &Contraction, cost: f64, bound: Option<f64>) {
         if let Some(bound) = bound {
             self.out.bounds.push(above(bound * self.layout.radius));
         }
-        self.out.merges.extend_from_slice(&done.merged);
-        for wedge in surface.wedges(done.kept) {
-            self.out.set_wedges.push(wedge);
-            let unscale = &self.unscale[self.wedge_primitive[wedge as usize] as usize * self.columns..];
-            let values = surface.value(wedge).iter().zip(&unscale[..self.columns]);
-            self.out.set_values.extend(values.map(|(value, unscale)| (f64::from(*value) * unscale) as f32));
-        }
-        let position = match done.place {
-            Place::Kept => self.positions[done.kept as usize],
-            Place::Gone => self.positions[done.gone as usize],
-            Place::New => self.layout.to_object(surface.positions[done.kept as usize]),
-        };
-        self.positions[done.kept as usize] = position;
-        self.out.steps.push(Step {
+        let taken = Taken {
             kept: done.kept,
             gone: done.gone,
-            position,
+            position: surface.positions[done.kept as usize],
             t: done.t as f32,
-            cost: (price.cost * self.cost_scale) as f32,
-            triangles: surface.alive as u32,
+            place: done.place,
+            cost,
+        };
+        let set = surface.wedges(done.kept).map(|wedge| (wedge, surface.value(wedge)));
+        self.take(&taken, &done.merged, set, surface.alive);
+    }
+
+    /// Adds a contraction that joined the wedges `merged` and gave those of the vertex that stays the values `set`.
+    pub fn take<'a>(
+        &mut self,
+        taken: &Taken,
+        merged: &[[u32; 2]],
+        set: impl Iterator<Item = (u32, &'a [f32])>,
+        triangles: usize,
+    ) {
+        self.out.merges.extend_from_slice(merged);
+        for (wedge, values) in set {
+            self.out.set_wedges.push(wedge);
+            let unscale = &self.unscale[self.wedge_primitive[wedge as usize] as usize * self.columns..];
+            let values = values.iter().zip(&unscale[..self.columns]);
+            self.out.set_values.extend(values.map(|(value, unscale)| (f64::from(*value) * unscale) as f32));
+        }
+        let &Taken { kept, gone, t, .. } = taken;
+        let position = match taken.place {
+            Place::Kept => self.positions[kept as usize],
+            Place::Gone => self.positions[gone as usize],
+            Place::New => self.layout.to_object(taken.position),
+        };
+        self.positions[kept as usize] = position;
+        self.out.steps.push(Step {
+            kept,
+            gone,
+            position,
+            t,
+            cost: (taken.cost * self.cost_scale) as f32,
+            triangles: triangles as u32,
             merges_end: self.out.merges.len() as u32,
             set_end: self.out.set_wedges.len() as u32,
         });

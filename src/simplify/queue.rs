@@ -33,8 +33,8 @@ struct Bin {
 /// Bits of a cost that its bin does not depend on: four bits of the mantissa are left.
 const SHIFT: u32 = 19;
 
-/// Costs are not negative, so their bits order as they do.
-fn bin(cost: f64) -> usize {
+/// The bin of a cost. Costs are not negative, so their bits order as they do.
+pub fn bin(cost: f64) -> usize {
     // −0 would order above everything.
     ((cost.max(0.0) as f32 + 0.0).to_bits() >> SHIFT) as usize
 }

@@ -7,7 +7,7 @@ use super::*;
 use crate::mesh::{Attribute, Format, Primitive};
 use crate::quadric::{cross, dot, sub};
 
-const BALANCED: Settings = Settings {
+pub(crate) const BALANCED: Settings = Settings {
     metric: MetricKind::Its,
     placement: Placement::Optimal,
     attributes: AttributeScale { normal: 0.003, texcoord: 0.3, color: 0.1 },
@@ -18,7 +18,7 @@ const BALANCED: Settings = Settings {
 };
 
 /// Every metric with every placement.
-fn all_settings() -> impl Iterator<Item = Settings> {
+pub(super) fn all_settings() -> impl Iterator<Item = Settings> {
     MetricKind::ALL.into_iter().flat_map(|metric| {
         let places = [(Placement::Optimal, true), (Placement::Optimal, false), (Placement::Subset, true)];
         let settings = places.map(|(placement, memoryless)| Settings { metric, placement, memoryless, ..BALANCED });
@@ -60,7 +60,7 @@ fn one(primitive: Primitive) -> Mesh {
 }
 
 /// A torus: closed, one seam in each direction of the texture.
-fn torus(columns: u32, rows: u32) -> Mesh {
+pub(crate) fn torus(columns: u32, rows: u32) -> Mesh {
     use std::f32::consts::TAU;
     one(grid(columns, rows, |u, v| {
         // The last column and row are the first again, bit for bit.

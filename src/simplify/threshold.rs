@@ -10,8 +10,9 @@
 
 use std::collections::BTreeSet;
 
+use super::driver::vanishing;
 use super::progressive::{Progressive, Recorder};
-use super::{Locks, legal, vanishing};
+use super::{Locks, legal};
 use crate::mesh::topology::{Contraction, Topology};
 use crate::metric::{Price, Staged};
 use crate::quadric::{dot, sub};
@@ -61,7 +62,7 @@ pub fn run<E: Staged>(surface: &mut Topology, metric: E, locks: &Locks, mut reco
         run.metric.contracting(run.surface, kept, gone, &price);
         run.surface.contract(kept, gone, price.position, &mut done);
         run.metric.contracted(run.surface, &done);
-        recorder.record(run.surface, &done, &price, run.metric.bound());
+        recorder.add(run.surface, &done, price.cost, run.metric.bound());
         run.surface.neighbours(kept, &mut neighbours);
         run.insert(kept, &neighbours);
         for &vertex in &neighbours {

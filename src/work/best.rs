@@ -12,6 +12,7 @@ use crate::appearance::drawable::Drawable;
 use crate::appearance::metric::Reference;
 use crate::appearance::render::{Cpu, Shot};
 use crate::appearance::views::fibonacci;
+use crate::lod::ChainLevel;
 use crate::mesh::{Level, Mesh, Primitive};
 use crate::plan::PartTask;
 use crate::quadric::{cross, dot, sub};
@@ -108,13 +109,16 @@ impl<'a> Loop<'a> {
         side * side
     }
 
-    /// Weights of the next round: more where the levels differ, less where they do not. `start` are those of the first.
-    pub(super) fn again(&self, weights: &Weights, start: &Weights, levels: &[Vec<Option<Level>>]) -> Weights {
+    /// Weights of the next round: more where the levels differ, less where they do not. `start` are those of the first. With
+    /// them the differences of the levels.
+    pub(super) fn again(&self, weights: &Weights, start: &Weights, levels: &[ChainLevel]) -> (Weights, Vec<f64>) {
         let faces: usize = self.surfaces.iter().map(|surface| surface.areas.len()).sum();
         let mut errors = vec![0.0; faces];
+        let mut differences = Vec::with_capacity(levels.len());
         for level in levels {
-            let drawable = self.judge.drawable(level);
+            let drawable = self.judge.drawable(&level.parts);
             let blame = self.own.blame(&Cpu, &drawable, faces).expect("the source was drawn at the same size");
+            differences.push(blame.rms);
             let sum: f64 = blame.squares.iter().sum();
             if sum > 0.0 {
                 // Every level counts the same, however much coarser one is.
@@ -124,7 +128,7 @@ impl<'a> Loop<'a> {
         let area: f64 = self.surfaces.iter().flat_map(|surface| &surface.areas).sum();
         let mean = errors.iter().sum::<f64>() / area;
         if !(mean > 0.0 && mean.is_finite()) {
-            return weights.clone();
+            return (weights.clone(), differences);
         }
         let mut first = 0;
         let next = self.surfaces.iter().enumerate().map(|(part, surface)| {
@@ -138,7 +142,7 @@ impl<'a> Loop<'a> {
             };
             density.into_iter().enumerate().map(weight).collect()
         });
-        Weights(next.collect())
+        (Weights(next.collect()), differences)
     }
 }
 

@@ -18,7 +18,7 @@ use serde::de::DeserializeOwned;
 use crate::appearance::looks::Looks;
 use crate::cache::{Bucket, Cache, Lookup};
 use crate::key::JobKey;
-use crate::lod::{self, Chain, ChainLevel, Part, Refit, Stop, chain};
+use crate::lod::{self, Chain, ChainLevel, Ground, Part, Refit, Stop, chain};
 use crate::mesh::Level;
 use crate::metric::Placement;
 use crate::plan::{ChainTask, LookTask, MeshLook, PartTask, Plan, Recipe, SequenceTask};
@@ -116,25 +116,29 @@ fn by_scene<T>(mut tasks: Vec<T>, scene: impl Fn(&T) -> usize) -> Vec<Vec<T>> {
 fn cut(task: &ChainTask, sequences: &BTreeMap<JobKey, Progressive>, looks: Option<&Arc<Looks>>) -> Chain {
     let judge = task.judged.as_ref().zip(looks).map(|(look, looks)| Judge::new(&task.parts, look, looks));
     let refits: Vec<Refit> = task.recipes.iter().map(refit).collect();
+    let grounds: Vec<Ground> = task.parts.iter().map(|part| Ground::new(&part.mesh)).collect();
     let recorded = |recipe: usize| -> Vec<Option<&Progressive>> {
         task.parts.iter().map(|part| part.sequences.get(recipe).map(|key| &sequences[key])).collect()
     };
     let Some(judge) = &judge else {
-        return chain(&parts(task, &recorded(0), refits[0]), &task.settings, None);
+        return chain(&parts(task, &grounds, &recorded(0), refits[0]), &task.settings, None);
     };
     let difference = |levels: &[Option<Level>]| judge.difference(levels);
-    let mut candidates: Vec<Chain> = (0..task.recipes.len())
+    let chains: Vec<Chain> = (0..task.recipes.len())
         .map(|recipe| {
-            let parts = parts(task, &recorded(recipe), refits[recipe]);
+            let parts = parts(task, &grounds, &recorded(recipe), refits[recipe]);
             named(chain(&parts, &task.settings, Some(&difference)), task, recipe, "")
         })
         .collect();
     if task.rounds == 0 {
-        return joined(best_of(candidates, difference).into_iter().map(|(_, level)| level));
+        let is_alone = chains.len() < 2;
+        let rank = |chain: Chain| Candidate::new(chain, |level| if is_alone { 0.0 } else { difference(&level.parts) });
+        return joined(best_of(chains.into_iter().map(rank)).into_iter().map(|(_, _, level)| level));
     }
     let around = Loop::new(judge, &task.parts);
-    let sum = |chain: &Chain| chain.levels.iter().map(|level| around.difference(&level.parts)).sum::<f64>();
-    let sums: Vec<f64> = candidates.iter().map(sum).collect();
+    let seen = |level: &ChainLevel| around.difference(&level.parts);
+    let mut candidates: Vec<Candidate> = chains.into_iter().map(|chain| Candidate::new(chain, seen)).collect();
+    let sums: Vec<f64> = candidates.iter().map(|candidate| candidate.differences.iter().sum()).collect();
     let winner = (0..sums.len()).reduce(|best, next| if sums[next] < sums[best] { next } else { best }).unwrap_or(0);
     let start = around.visibility();
     let mut weights = start.clone();
@@ -146,16 +150,18 @@ fn cut(task: &ChainTask, sequences: &BTreeMap<JobKey, Progressive>, looks: Optio
                 (!is_left).then(|| simplify_weighted(&part.mesh, &task.recipes[winner].settings, weights))
             })
             .collect();
-        let next = chain(&parts(task, &borrowed(&made), refits[winner]), &task.settings, Some(&difference));
+        let next = chain(&parts(task, &grounds, &borrowed(&made), refits[winner]), &task.settings, Some(&difference));
+        let next = named(next, task, winner, &format!(", round {round}"));
         if round < task.rounds {
-            let levels: Vec<Vec<Option<Level>>> = next.levels.iter().map(|level| level.parts.clone()).collect();
-            weights = around.again(&weights, &start, &levels);
+            let (next_weights, differences) = around.again(&weights, &start, &next.levels);
+            weights = next_weights;
+            candidates.push(Candidate { chain: next, differences });
+        } else {
+            candidates.push(Candidate::new(next, seen));
         }
-        candidates.push(named(next, task, winner, &format!(", round {round}")));
         rounds.push(made);
     }
-    let seen = |levels: &[Option<Level>]| around.difference(levels);
-    let winners = best_of(candidates, seen).into_iter().map(|(number, level)| {
+    let winners = best_of(candidates).into_iter().map(|(number, difference, level)| {
         if refits[winner] == Refit::Never || level.stop == Stop::LookLimit {
             return level;
         }
@@ -164,7 +170,7 @@ fn cut(task: &ChainTask, sequences: &BTreeMap<JobKey, Progressive>, looks: Optio
         let own = round.map_or_else(|| recorded(number), |round| borrowed(&rounds[round]));
         let targets = vec![task.settings.targets[level.target]];
         let settings = lod::ChainSettings { targets, ..task.settings.clone() };
-        let parts = |refit| parts(task, &own, refit);
+        let parts = |refit| parts(task, &grounds, &own, refit);
         let others =
             [Refit::Never, Refit::Shape, Refit::Whole].map(|refit| chain(&parts(refit), &settings, None).levels.pop());
         let others = others.into_iter().flatten().map(|other| ChainLevel {
@@ -172,9 +178,9 @@ fn cut(task: &ChainTask, sequences: &BTreeMap<JobKey, Progressive>, looks: Optio
             recipe: level.recipe.clone(),
             ..other
         });
-        let mut best = (seen(&level.parts), level.clone());
+        let mut best = (difference, level.clone());
         for other in others.filter(|other| other.parts != level.parts) {
-            let difference = seen(&other.parts);
+            let difference = seen(&other);
             if difference < best.0 {
                 best = (difference, other);
             }
@@ -195,16 +201,21 @@ fn refit(recipe: &Recipe) -> Refit {
     if has_time && settings.placement == Placement::Optimal { Refit::Coarse } else { Refit::Never }
 }
 
-fn parts<'a>(chain: &'a ChainTask, sequences: &[Option<&'a Progressive>], refit: Refit) -> Vec<Part<'a>> {
+fn parts<'a>(
+    chain: &'a ChainTask,
+    grounds: &'a [Ground<'a>],
+    sequences: &[Option<&'a Progressive>],
+    refit: Refit,
+) -> Vec<Part<'a>> {
     let hold_borders = chain.recipes.iter().any(|recipe| recipe.settings.lock_border);
-    let part = |(task, sequence): (&'a PartTask, Option<&'a Progressive>)| Part {
-        mesh: &task.mesh,
+    let part = |((task, ground), sequence): ((&'a PartTask, &'a Ground<'a>), Option<&'a Progressive>)| Part {
+        ground,
         sequence,
         shareable: task.shareable,
         refit,
         hold_borders,
     };
-    chain.parts.iter().zip(sequences.iter().copied()).map(part).collect()
+    chain.parts.iter().zip(grounds).zip(sequences.iter().copied()).map(part).collect()
 }
 
 /// Notes in every level what made it, where there was a choice.
@@ -216,24 +227,35 @@ fn named(mut chain: Chain, task: &ChainTask, recipe: usize, more: &str) -> Chain
     chain
 }
 
-/// For each target the level that differs least, with the number of its chain; where looks were the target, the one with
-/// the fewest triangles. The first of equals.
-fn best_of(candidates: Vec<Chain>, difference: impl Fn(&[Option<Level>]) -> f64) -> Vec<(usize, ChainLevel)> {
-    let only = candidates.len() < 2;
-    let mut by_target: BTreeMap<usize, Vec<(usize, ChainLevel)>> = BTreeMap::new();
-    for (number, level) in
-        candidates.into_iter().enumerate().flat_map(|(i, c)| c.levels.into_iter().map(move |l| (i, l)))
-    {
-        by_target.entry(level.target).or_default().push((number, level));
+/// A chain, and how much each of its levels differs from the source to look at.
+struct Candidate {
+    chain: Chain,
+    differences: Vec<f64>,
+}
+
+impl Candidate {
+    /// Looks at every level.
+    fn new(chain: Chain, seen: impl Fn(&ChainLevel) -> f64) -> Self {
+        let differences = chain.levels.iter().map(seen).collect();
+        Self { chain, differences }
     }
-    let rank = |level: &ChainLevel| match level.stop {
-        _ if only => 0.0,
+}
+
+/// For each target the level that differs least, with the number of its chain and by how much; where looks were the target, the
+/// one with the fewest triangles. The first of equals.
+fn best_of(candidates: impl IntoIterator<Item = Candidate>) -> Vec<(usize, f64, ChainLevel)> {
+    let mut by_target: BTreeMap<usize, Vec<(usize, f64, ChainLevel)>> = BTreeMap::new();
+    for (number, candidate) in candidates.into_iter().enumerate() {
+        for (level, difference) in candidate.chain.levels.into_iter().zip(candidate.differences) {
+            by_target.entry(level.target).or_default().push((number, difference, level));
+        }
+    }
+    let rank = |(_, difference, level): &(usize, f64, ChainLevel)| match level.stop {
         Stop::LookLimit => level.triangles as f64,
-        _ => difference(&level.parts),
+        _ => *difference,
     };
-    let best = |levels: Vec<(usize, ChainLevel)>| {
-        let ranked = levels.into_iter().map(|(number, level)| (rank(&level), number, level));
-        ranked.reduce(|best, next| if next.0 < best.0 { next } else { best }).map(|(_, number, level)| (number, level))
+    let best = |levels: Vec<(usize, f64, ChainLevel)>| {
+        levels.into_iter().reduce(|best, next| if rank(&next) < rank(&best) { next } else { best })
     };
     by_target.into_values().filter_map(best).collect()
 }

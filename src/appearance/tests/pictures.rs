@@ -144,7 +144,7 @@ fn differences_go_to_the_faces_seen_there() {
     let blame = reference.blame(&Cpu, &half, 2).unwrap();
     // The second face is missing: all of the difference is its.
     let rms = reference.compare(&Cpu, &half, false).unwrap().rms;
-    assert_eq!((blame.squares[0], blame.nowhere), (0.0, 0.0));
+    assert_eq!((blame.squares[0], blame.nowhere, blame.rms), (0.0, 0.0, rms));
     assert!((blame.squares[1] / 4096.0 - rms * rms).abs() < 1e-3 * rms * rms);
     assert_eq!(blame.pixels.iter().sum::<u32>() as usize, covered(&reference.pictures[0]));
     // The other way round, the candidate's pixels lie within reach of the reference's face or nowhere.

@@ -44,7 +44,7 @@ const THREE: [[f64; 3]; 3] = [
 const PLENTY: usize = 16;
 
 /// Samples of a batch, about.
-const BATCH: usize = 1 << 15;
+const BATCH: usize = 1 << 13;
 
 /// The samples of a source for one level.
 pub(super) struct Samples<'a> {
