@@ -204,6 +204,9 @@ fn chain_sized(parts: &[Part], settings: &ChainSettings, judge: Option<Judge>, l
     if source <= large {
         return Chain { levels: planned.iter().map(|planned| one(&mut first, planned)).collect() };
     }
+    for planned in &planned {
+        first.iter().zip(&planned.cuts).for_each(|(cutter, &cut)| cutter.prepare(cut));
+    }
     // Each thread goes down on its own and takes the next level that nobody has.
     let next = AtomicUsize::new(0);
     let done: Mutex<Vec<(usize, ChainLevel)>> = Mutex::new(Vec::new());

@@ -93,6 +93,27 @@ impl<'a> Cutter<'a> {
         within.min(self.sequence.steps.len())
     }
 
+    /// How a level is fitted.
+    fn fit(&self, cut: usize) -> Option<Fit> {
+        let (left, whole) = (self.sequence.triangles_after(cut), self.sequence.triangles as usize);
+        let is_coarse = left as f64 <= whole as f64 * COARSE;
+        let hold_borders = self.part.hold_borders;
+        match self.part.refit {
+            Refit::Never => None,
+            Refit::Coarse if !is_coarse => None,
+            Refit::Shape => Some(Fit { shape: true, normals: None, hold_borders }),
+            Refit::Coarse | Refit::Whole => Some(Fit { shape: true, normals: Some(SAME_NORMAL), hold_borders }),
+        }
+    }
+
+    /// Makes what a level shares with others, before they are made side by side: a thread that waited for it could take
+    /// up the making of another one, and wait for itself.
+    pub(super) fn prepare(&self, cut: usize) {
+        if self.fit(cut).is_some() {
+            self.part.ground.importance();
+        }
+    }
+
     pub(super) fn level(&mut self, cut: usize, finish: Finish) -> Level {
         if cut < self.done {
             // A later target asked for a finer cut of this part: start again.
@@ -101,15 +122,7 @@ impl<'a> Cutter<'a> {
         self.done = cut;
         self.replay.advance(cut);
         let mut cuts = self.replay.primitives();
-        let (left, whole) = (self.sequence.triangles_after(cut), self.sequence.triangles as usize);
-        let is_coarse = left as f64 <= whole as f64 * COARSE;
-        let hold_borders = self.part.hold_borders;
-        let fit = match self.part.refit {
-            Refit::Never => None,
-            Refit::Coarse if !is_coarse => None,
-            Refit::Shape => Some(Fit { shape: true, normals: None, hold_borders }),
-            Refit::Coarse | Refit::Whole => Some(Fit { shape: true, normals: Some(SAME_NORMAL), hold_borders }),
-        };
+        let fit = self.fit(cut);
         if let Some(fit) = fit {
             self.replay.refit(&mut cuts, self.part.ground.importance(), fit);
         }

@@ -32,7 +32,7 @@ pub struct Sizes {
 
 impl Sizes {
     /// What is used.
-    pub const USUAL: Self = Self { large: 200_000, enough: 128_000, block: 64_000 };
+    pub const USUAL: Self = Self { large: 200_000, enough: 64_000, block: 32_000 };
 }
 
 /// Fewest blocks.
