@@ -55,6 +55,7 @@ pub(crate) fn scene(path: &str) -> SceneRecord {
             geometry_bytes: 15_000,
             images: vec![image("wood", 4_000, 512), image("paint", 1_000, 2048)],
         }),
+        batches: None,
     }
 }
 

@@ -163,6 +163,28 @@ choice! {
 }
 
 choice! {
+    /// How instances are written: nodes that show the same mesh.
+    Instancing {
+        /// As nodes. Every reader takes it, and each instance switches levels by itself.
+        #[default]
+        Nodes = "nodes",
+        /// As batches of `EXT_mesh_gpu_instancing`, which take one draw call and switch levels as one.
+        Gpu = "gpu",
+    }
+}
+
+choice! {
+    /// What the name of a node is worth, where the node would become part of a batch.
+    NodeNames {
+        /// A node with a name stays a node, so that a program can find it.
+        #[default]
+        Keep = "keep",
+        /// Names are but labels, and go.
+        Drop = "drop",
+    }
+}
+
+choice! {
     /// Unit of a level's `error`.
     ErrorUnit {
         /// Fraction of the sub-mesh's bounding radius.

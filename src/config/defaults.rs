@@ -59,5 +59,9 @@ pub const DECIDING_LOOK_SIZE: u32 = 128;
 /// mesh that fills a screen, and thirty times what single precision rounds away on its way through a transform.
 pub const TOLERANCE: f64 = 1e-5;
 
+/// Radius of a batch of instances at most, in radii of its largest instance. A batch shows a level only where its nearest instance
+/// may: its far side, twice this radius away, gets more triangles than it needs. Smaller ones cost draw calls.
+pub const CELL: f64 = 32.0;
+
 /// Levels where `[[lod]]` is absent: shares of the source's triangles.
 pub const RATIOS: [f64; 3] = [0.5, 0.25, 0.1];

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::budget::BudgetEntry;
-use super::choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Recover, Storage};
+use super::choice::{Effort, ErrorUnit, Format, Instancing, Metric, NodeNames, Placement, Profile, Recover, Storage};
 use super::defaults;
 
 /// A string or a list of strings.
@@ -93,7 +93,7 @@ pub(super) struct PipelineFile {
     /// How looks are measured.
     pub appearance: Option<AppearanceTable>,
 
-    /// Which repeated meshes become instances.
+    /// Which repeated meshes become instances, and how these are written.
     pub instances: Option<InstancesTable>,
 
     /// The levels, finest first. Default: ratios 0.5, 0.25 and 0.1.
@@ -196,8 +196,8 @@ pub(super) struct AppearanceTable {
     pub size: Option<u32>,
 }
 
-/// Instances that nobody declared: meshes of a scene that are another one of it, reordered, moved, scaled or mirrored. Their
-/// nodes then show the first one, and their bytes go: level 0 is the source's within the tolerance.
+/// Instances. Those that nobody declared: meshes of a scene that are another one of it, reordered, moved, scaled or mirrored; their
+/// nodes then show the first one, and their bytes go: level 0 is the source's within the tolerance. And how instances are written.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct InstancesTable {
@@ -209,6 +209,24 @@ pub(super) struct InstancesTable {
     /// and tangents; more than 0, at most 0.01. Default: 0.00001.
     #[schemars(range(max = 0.01), extend("exclusiveMinimum" = 0, "default" = defaults::TOLERANCE))]
     pub tolerance: Option<f64>,
+
+    /// How nodes that show the same mesh are written. Default: nodes.
+    #[schemars(extend("default" = Instancing::default()))]
+    pub instancing: Option<Instancing>,
+
+    /// Radius of a batch at most, in radii of its largest instance; more than 0. Larger ones take fewer draw calls and show more
+    /// triangles, since a batch switches levels as one. Default: 32.
+    #[schemars(extend("exclusiveMinimum" = 0, "default" = defaults::CELL))]
+    pub cell: Option<f64>,
+
+    /// Whether nodes with names may become part of a batch, which loses their names. Default: keep.
+    #[schemars(extend("default" = NodeNames::default()))]
+    pub names: Option<NodeNames>,
+
+    /// Batches are a required extension: readers that do not know it refuse the file, instead of showing one instance of each
+    /// batch. Default: true.
+    #[schemars(extend("default" = true))]
+    pub required: Option<bool>,
 }
 
 /// One level: exactly one of `ratio`, `triangles`, `error`, `pixels` and `appearance` says how coarse it is.

@@ -19,7 +19,9 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 pub use budget::{Bounds, Budget, Fact, Limit};
-pub use choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Recover, Renderer, Storage};
+pub use choice::{
+    Effort, ErrorUnit, Format, Instancing, Metric, NodeNames, Placement, Profile, Recover, Renderer, Storage,
+};
 pub use error::{ConfigError, Names, Place};
 pub use file::schema;
 pub use globs::Globs;

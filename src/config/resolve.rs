@@ -44,7 +44,7 @@ impl Layer {
         lay!(over.simplify, self.simplify; metric, effort, normal, texcoord, color, border, seam, crease);
         lay!(over.simplify, self.simplify; placement, min_triangles, lock_border, candidates);
         lay!(over.appearance, self.appearance; record, size);
-        lay!(over.instances, self.instances; recover, tolerance);
+        lay!(over.instances, self.instances; recover, tolerance, instancing, cell, names, required);
     }
 
     /// Fills what is still absent with defaults.
@@ -78,6 +78,11 @@ impl Layer {
             instances: InstanceSettings {
                 recover: self.instances.recover.unwrap_or_default(),
                 tolerance: self.instances.tolerance.unwrap_or(defaults::TOLERANCE),
+                instancing: self.instances.instancing.unwrap_or_default(),
+                cell: self.instances.cell.unwrap_or(defaults::CELL),
+                names: self.instances.names.unwrap_or_default(),
+                // The profile promises a file without required extensions.
+                required: self.instances.required.unwrap_or(self.profile != Some(super::Profile::Core)),
             },
         };
         if self.appearance.size.is_none() && settings.looks_decide() {

@@ -5,7 +5,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::choice::{Effort, ErrorUnit, Format, Metric, Placement, Profile, Recover, Storage};
+use super::choice::{Effort, ErrorUnit, Format, Instancing, Metric, NodeNames, Placement, Profile, Recover, Storage};
 use super::defaults;
 
 /// Everything that decides what becomes of one scene.
@@ -23,24 +23,40 @@ pub struct SceneSettings {
     pub emit: EmitSettings,
     /// How looks are measured.
     pub appearance: AppearanceSettings,
-    /// Which repeated meshes become instances. Absent in records of earlier versions.
+    /// Which repeated meshes become instances, and how these are written. Absent in records of earlier versions.
     #[serde(default)]
     pub instances: InstanceSettings,
 }
 
-/// Which repeated meshes become instances.
+/// Which repeated meshes become instances, and how instances are written.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct InstanceSettings {
     /// How far such meshes may be from the first.
     pub recover: Recover,
     /// What may be left between a mesh and the one rebuilt from the first: of positions as a fraction of the radius, of
     /// normals and tangents between unit vectors; more than 0.
     pub tolerance: f64,
+    /// How instances are written.
+    pub instancing: Instancing,
+    /// Radius of a batch at most, in radii of its largest instance; more than 0.
+    pub cell: f64,
+    /// What the names of nodes are worth.
+    pub names: NodeNames,
+    /// Readers that do not know batches must refuse the file.
+    pub required: bool,
 }
 
 impl Default for InstanceSettings {
     fn default() -> Self {
-        Self { recover: Recover::None, tolerance: defaults::TOLERANCE }
+        Self {
+            recover: Recover::None,
+            tolerance: defaults::TOLERANCE,
+            instancing: Instancing::Nodes,
+            cell: defaults::CELL,
+            names: NodeNames::Keep,
+            required: true,
+        }
     }
 }
 

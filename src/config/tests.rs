@@ -89,6 +89,7 @@ fn ranges_are_stated() {
     insta::assert_snapshot!(refused("[[lod]]\ntriangles = 0"), @"`project/pipeline.toml` line 4: lod[0].triangles 0 is out of range: must be 1 or more");
     insta::assert_snapshot!(refused("[[lod]]\ntriangles = 5_000_000_000"), @"`project/pipeline.toml` line 4: lod[0].triangles 5_000_000_000 is out of range: must be between 1 and 4294967295, both inclusive");
     insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\ncoverage = 1.01"), @"`project/pipeline.toml` line 5: lod[0].coverage 1.01 is out of range: must be more than 0 and at most 1");
+    insta::assert_snapshot!(refused("[instances]\ncell = 0"), @"`project/pipeline.toml` line 4: instances.cell 0 is out of range: must be more than 0");
     insta::assert_snapshot!(refused("[instances]\ntolerance = 0"), @"`project/pipeline.toml` line 4: instances.tolerance 0 is out of range: must be more than 0 and at most 0.01");
     insta::assert_snapshot!(refused("[simplify]\nnormal = -0.1"), @"`project/pipeline.toml` line 4: simplify.normal -0.1 is out of range: must be 0 or more");
     insta::assert_snapshot!(refused("[simplify]\nnormal = nan"), @"`project/pipeline.toml` line 4: simplify.normal nan is out of range: must be finite, and 0 or more");

@@ -6,8 +6,8 @@
 use super::decode::meshopt::EXTENSIONS;
 use super::document::{Container, Document};
 use super::error::{DocumentError, Problem};
-use super::{json, uri};
-use serde_json::Value;
+use super::{json, package, uri};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -74,12 +74,30 @@ impl Buffers {
         Some(&data[..slot.length])
     }
 
-    /// Gives a buffer other bytes.
-    pub(super) fn replace(&mut self, index: usize, bytes: Vec<u8>) {
+    /// Gives a buffer other bytes, here and in its document: a BIN chunk and a data URI hold them, a buffer that was a file
+    /// loses its address, and `package` finds it another one.
+    pub(super) fn rewrite(
+        &mut self,
+        document: &mut Document,
+        index: usize,
+        bytes: Vec<u8>,
+    ) -> Result<(), DocumentError> {
+        let entry = &mut document.array_mut("buffers")?[index];
+        entry["byteLength"] = json!(bytes.len());
+        let address = entry.get("uri").and_then(Value::as_str).map(uri::form);
+        let is_chunk = address.is_none() && index == 0 && document.container == Container::Glb;
+        let entry = &mut document.array_mut("buffers")?[index];
+        match address {
+            Some(uri::Form::Data) => entry["uri"] = json!(package::data_uri(&bytes)),
+            Some(_) => drop(entry.as_object_mut().and_then(|entry| entry.shift_remove("uri"))),
+            None if is_chunk => document.bin = Some(Arc::from(bytes.as_slice())),
+            None => {}
+        }
         if let Some(slot) = self.slots.get_mut(index) {
             slot.length = bytes.len();
             slot.data = Some(Blob::Whole(Arc::new(bytes)));
         }
+        Ok(())
     }
 
     /// `length` bytes from `offset` of a buffer; every lie about them is an error at `place`.

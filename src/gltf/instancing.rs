@@ -10,8 +10,10 @@ use super::document::Document;
 use super::encode::unit;
 use super::error::DocumentError;
 use super::json;
+use super::similarity;
 use super::views::Views;
 use crate::mesh::ComponentType;
+use glam::{DQuat, DVec3};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
@@ -24,36 +26,28 @@ pub(super) const MOVE_WITH_MESH: [&str; 2] = [INSTANCING, "EXT_instance_features
 /// How far the instances of one node reach, in the node's own space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Batch {
-    /// Radius of the sphere round all instances' origins.
+    /// Radius of the sphere round the middles of all instances.
     pub spread: f64,
     /// Largest scale factor among them.
     pub scale: f64,
 }
 
 impl Batch {
-    /// From the instances' translations and scales; a missing attribute is empty. `None` if there is no instance.
-    pub fn new(translations: &[[f32; 3]], scales: &[[f32; 3]]) -> Option<Self> {
-        if translations.is_empty() && scales.is_empty() {
-            return None;
-        }
-        let points = || translations.iter().map(|t| t.map(f64::from));
-        let mut centre = [0.0; 3];
-        for (axis, middle) in centre.iter_mut().enumerate() {
-            let low = points().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
-            let high = points().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max);
-            *middle = if low <= high { f64::midpoint(low, high) } else { 0.0 };
-        }
-        let distance = |p: [f64; 3]| (0..3).map(|i| (p[i] - centre[i]) * (p[i] - centre[i])).sum::<f64>().sqrt();
-        let spread = points().map(distance).fold(0.0, f64::max);
+    /// From the middles of the instances and their scales; without scales all are 1. `None` if there is no instance.
+    pub fn new(middles: &[DVec3], scales: &[[f32; 3]]) -> Option<Self> {
+        let first = middles.first()?;
+        let (low, high) = middles.iter().fold((*first, *first), |(low, high), p| (low.min(*p), high.max(*p)));
+        let middle = (low + high) * 0.5;
+        let spread = middles.iter().map(|p| p.distance(middle)).fold(0.0, f64::max);
         let scale = scales.iter().flatten().map(|s| f64::from(s.abs())).fold(0.0, f64::max);
         let scale = if scales.is_empty() { 1.0 } else { scale };
-        (spread.is_finite() && scale.is_finite()).then_some(Self { spread, scale })
+        let is_finite = middles.iter().all(|p| p.is_finite()) && scale.is_finite();
+        is_finite.then_some(Self { spread, scale })
     }
 
-    /// What the batch is on the screen. `offset` is how far the mesh's centre lies from its origin: instances turn
-    /// round their origins.
-    pub(super) fn extent(&self, radius: f64, offset: f64) -> Extent {
-        Extent { radius: self.spread + self.scale * (radius + offset), scale: self.scale, batch: true }
+    /// What the batch is on the screen.
+    pub(super) fn extent(&self, radius: f64) -> Extent {
+        Extent { radius: self.spread + self.scale * radius, scale: self.scale, batch: true }
     }
 }
 
@@ -67,16 +61,38 @@ pub fn batches(document: &Document, buffers: &Buffers) -> Result<Batches, Docume
     for (i, node) in document.array("nodes")?.iter().enumerate() {
         let Some(extension) = json::extension(node, INSTANCING) else { continue };
         let place = format!("nodes[{i}].extensions.{INSTANCING}.attributes");
-        let vectors = |name: &str| -> Result<Vec<[f32; 3]>, DocumentError> {
+        let vectors = |name: &str, kind: &str, components: usize| -> Result<Vec<f32>, DocumentError> {
             let attributes = extension.get("attributes").unwrap_or(&Value::Null);
             let Some(accessor) = json::index(attributes, name, &place)? else { return Ok(Vec::new()) };
             let numbers = Accessor::parse(document, accessor, &place)?.numbers(&views, None)?;
-            if numbers.components != 3 {
-                return Err(DocumentError::invalid(&place, format!("`{name}` must be of type `VEC3`")));
+            if numbers.components != components {
+                return Err(DocumentError::invalid(&place, format!("`{name}` must be of type `{kind}`")));
             }
-            Ok(numbers.values.chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect())
+            Ok(numbers.values)
         };
-        if let Some(batch) = Batch::new(&vectors("TRANSLATION")?, &vectors("SCALE")?) {
+        let shifts = vectors("TRANSLATION", "VEC3", 3)?;
+        let turns = vectors("ROTATION", "VEC4", 4)?;
+        let scales = vectors("SCALE", "VEC3", 3)?;
+        let scales: Vec<[f32; 3]> = scales.chunks_exact(3).map(|s| [s[0], s[1], s[2]]).collect();
+        let mesh = json::index(node, "mesh", format_args!("nodes[{i}]"))?;
+        let centre = mesh.map_or(DVec3::ZERO, |mesh| centre(document, mesh));
+        // Where the attributes disagree, what all of them can serve is drawn.
+        let counts = [shifts.len() / 3, turns.len() / 4, scales.len()];
+        let count = counts.into_iter().filter(|&count| 0 < count).min().unwrap_or(0);
+        let middle = |i: usize| {
+            let wide = |values: &[f32], at: usize| f64::from(values[at]);
+            let three = |values: &[f32], default: DVec3| match values.get(i * 3..i * 3 + 3) {
+                Some(v) => DVec3::new(wide(v, 0), wide(v, 1), wide(v, 2)),
+                None => default,
+            };
+            let scale = scales.get(i).map_or(DVec3::ONE, |s| DVec3::from_array(s.map(f64::from)));
+            let turn = turns.get(i * 4..i * 4 + 4).map_or(DQuat::IDENTITY, |q| {
+                similarity::rotation(DQuat::from_xyzw(wide(q, 0), wide(q, 1), wide(q, 2), wide(q, 3)))
+            });
+            three(&shifts, DVec3::ZERO) + turn * (scale * centre)
+        };
+        let middles: Vec<DVec3> = (0..count).map(middle).collect();
+        if let Some(batch) = Batch::new(&middles, &scales) {
             batches.insert(i, batch);
         }
     }
@@ -98,8 +114,8 @@ pub(super) fn take_moving(node: &mut Map<String, Value>) -> Map<String, Value> {
     moving
 }
 
-/// Distance of the centre of a mesh's bounds from its origin, by the `min` and `max` of its positions.
-pub(super) fn centre_offset(document: &Document, mesh: usize) -> f64 {
+/// The centre of a mesh's bounds, by the `min` and `max` of its positions.
+fn centre(document: &Document, mesh: usize) -> DVec3 {
     let accessors = document.array("accessors").unwrap_or_default();
     let meshes = document.array("meshes").unwrap_or_default();
     let primitives = meshes.get(mesh).and_then(|m| m.get("primitives")).and_then(Value::as_array);
@@ -118,7 +134,7 @@ pub(super) fn centre_offset(document: &Document, mesh: usize) -> f64 {
         }
     }
     let middle = |i: usize| if low[i] <= high[i] { f64::midpoint(low[i], high[i]) } else { 0.0 };
-    (0..3).map(|i| middle(i) * middle(i)).sum::<f64>().sqrt()
+    DVec3::new(middle(0), middle(1), middle(2))
 }
 
 #[cfg(test)]
@@ -129,13 +145,14 @@ mod tests {
 
     #[test]
     fn a_batch_reaches_from_its_middle_to_its_farthest_instance() {
-        let batch = Batch::new(&[[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]], &[[1.0, 1.0, 1.0], [1.0, -3.0, 1.0]]).unwrap();
+        let batch = Batch::new(&[DVec3::ZERO, DVec3::X * 10.0], &[[1.0, 1.0, 1.0], [1.0, -3.0, 1.0]]).unwrap();
         assert_eq!(batch, Batch { spread: 5.0, scale: 3.0 });
-        let extent = batch.extent(2.0, 1.0);
-        assert_eq!((extent.radius, extent.scale), (5.0 + 3.0 * 3.0, 3.0));
-        assert_eq!(Batch::new(&[[4.0, 0.0, 0.0]], &[]), Some(Batch { spread: 0.0, scale: 1.0 }));
+        let extent = batch.extent(2.0);
+        assert_eq!((extent.radius, extent.scale), (5.0 + 3.0 * 2.0, 3.0));
+        assert_eq!(Batch::new(&[DVec3::X * 4.0], &[]), Some(Batch { spread: 0.0, scale: 1.0 }));
         assert_eq!(Batch::new(&[], &[]), None);
-        assert_eq!(Batch::new(&[[f32::NAN, 0.0, 0.0]], &[[f32::INFINITY; 3]]), None);
+        assert_eq!(Batch::new(&[DVec3::NAN], &[[f32::INFINITY; 3]]), None);
+        assert_eq!(Batch::new(&[DVec3::NAN, DVec3::ONE], &[]), None);
     }
 
     #[test]
@@ -153,14 +170,14 @@ mod tests {
     }
 
     #[test]
-    fn the_offset_of_a_mesh_is_that_of_its_bounds() {
+    fn the_centre_of_a_mesh_is_that_of_its_bounds() {
         let mut document = Document::new(Container::Gltf, "test");
         document.json["accessors"] = json!([{ "min": [2.0, -1.0, 0.0], "max": [4.0, 1.0, 8.0] }]);
         document.json["meshes"] = json!([{ "primitives": [{ "attributes": { "POSITION": 0 } }] }, {}]);
-        assert_eq!(centre_offset(&document, 0), 5.0);
-        assert_eq!(centre_offset(&document, 1), 0.0);
+        assert_eq!(centre(&document, 0), DVec3::new(3.0, 0.0, 4.0));
+        assert_eq!(centre(&document, 1), DVec3::ZERO);
         document.json["accessors"] =
             json!([{ "componentType": 5123, "normalized": true, "min": [0, 0, 0], "max": [65535, 0, 0] }]);
-        assert_eq!(centre_offset(&document, 0), 0.5);
+        assert_eq!(centre(&document, 0), DVec3::X * 0.5);
     }
 }

@@ -354,7 +354,7 @@ impl Grouping<'_> {
 
     fn group(&self, document: &mut Document, anchor: &Anchor, names: &mut Option<Names>) -> Result<Moved, WriteError> {
         let written = &self.written[&anchor.mesh];
-        let thresholds = self.thresholds(document, anchor.node, anchor.mesh);
+        let thresholds = self.thresholds(anchor.node, anchor.mesh);
         let nodes = document.array_mut("nodes")?;
         let child = nodes.len();
         let levels: Vec<LevelNode> = (written.meshes.iter().zip(&written.targets).enumerate())
@@ -385,11 +385,11 @@ impl Grouping<'_> {
         Ok(Moved { node: anchor.node, carrier, mesh: anchor.mesh, repeated: anchor.repeated, levels })
     }
 
-    fn thresholds(&self, document: &Document, node: usize, mesh: usize) -> Thresholds {
+    fn thresholds(&self, node: usize, mesh: usize) -> Thresholds {
         let chain = &self.chains[&mesh];
         let errors: Vec<f64> = chain.levels.iter().map(|level| level.error).collect();
         let extent = match self.batches.get(&node) {
-            Some(batch) => batch.extent(chain.radius, instancing::centre_offset(document, mesh)),
+            Some(batch) => batch.extent(chain.radius),
             None => Extent { radius: chain.radius, scale: 1.0, batch: false },
         };
         Thresholds::new(extent, &errors, self.settings)

@@ -3,7 +3,7 @@
 //! `document` holds a file without loss; `buffers`, `accessor` and `decode` turn its bytes into numbers; `read` puts
 //! a whole scene together. `lod` appends levels to a document (`write` the binary data, `level_mesh` the meshes,
 //! `follow` whoever pointed at them), `package` makes files of it, and `rules` checks them.
-//! `share` writes instances that were found.
+//! `share` writes instances that were found, `fold` makes batches of nodes that show the same mesh.
 
 pub mod accessor;
 pub mod buffers;
@@ -16,6 +16,7 @@ mod encode;
 pub mod error;
 #[cfg(test)]
 mod fixture;
+pub mod fold;
 mod follow;
 mod host;
 pub mod instancing;

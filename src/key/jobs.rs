@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{ALGORITHM_VERSION, EMIT_VERSION, FORMAT_VERSION, Manifest, ManifestWriter};
 use crate::config::{
-    ChainSettings, EmitSettings, LevelTarget, Metric, Recover, SceneSettings, Screen, SimplifySettings, Weights,
+    ChainSettings, EmitSettings, InstanceSettings, Instancing, LevelTarget, Metric, Recover, SceneSettings, Screen,
+    SimplifySettings, Weights,
 };
 use crate::mesh::Mesh;
 use crate::mesh::hash::MeshHash;
@@ -72,12 +73,7 @@ impl Manifest for SceneSettings {
         if appearance.record || self.looks_decide() {
             to.integer("look_size", appearance.size.into());
         }
-        if instances.recover != Recover::None {
-            to.group("instances", |to| {
-                to.text("recover", instances.recover.name());
-                to.number("tolerance", instances.tolerance);
-            });
-        }
+        write_instances(instances, to);
     }
 }
 
@@ -134,6 +130,25 @@ pub fn write_chain(settings: &ChainSettings, to: &mut dyn ManifestWriter) {
             LevelTarget::Appearance(limit) => to.number("appearance", limit),
         });
     }
+}
+
+fn write_instances(settings: &InstanceSettings, to: &mut dyn ManifestWriter) {
+    let InstanceSettings { recover, tolerance, instancing, cell, names, required } = *settings;
+    if recover == Recover::None && instancing == Instancing::Nodes {
+        return;
+    }
+    to.group("instances", |to| {
+        if recover != Recover::None {
+            to.text("recover", recover.name());
+        }
+        to.number("tolerance", tolerance);
+        if instancing == Instancing::Gpu {
+            to.text("instancing", instancing.name());
+            to.number("cell", cell);
+            to.text("names", names.name());
+            to.flag("required", required);
+        }
+    });
 }
 
 fn write_emit(settings: &EmitSettings, to: &mut dyn ManifestWriter) {

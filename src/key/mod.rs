@@ -25,7 +25,7 @@ pub const ALGORITHM_VERSION: u32 = 7;
 pub const LOOK_VERSION: u32 = 1;
 
 /// Form of the outputs. Raise it in the commit that writes the same levels in another way.
-pub const EMIT_VERSION: u32 = 3;
+pub const EMIT_VERSION: u32 = 4;
 
 /// Declares a 32-byte name, shown as 64 hexadecimal digits.
 macro_rules! digest {

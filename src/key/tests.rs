@@ -41,7 +41,7 @@ const LEVELS: &[&str] = &["chain", "scene"];
 const SCENE: &[&str] = &["scene"];
 
 /// Every setting of a scene, another value for it, and the keys that it must change.
-const CASES: [(&str, &[&str], &str); 26] = [
+const CASES: [(&str, &[&str], &str); 27] = [
     (
         "simplify.metric = 'qem'",
         ALL,
@@ -91,6 +91,11 @@ const CASES: [(&str, &[&str], &str); 26] = [
         "instances = { recover = 'similar', tolerance = 1e-4 }",
         SCENE,
         "instances.recover: (none) -> similar; instances.tolerance: (none) -> 0.0001",
+    ),
+    (
+        "instances = { instancing = 'gpu', cell = 20, names = 'drop', required = false }",
+        SCENE,
+        "instances.tolerance: (none) -> 1e-5; instances.instancing: (none) -> gpu; instances.cell: (none) -> 20.0; instances.names: (none) -> drop; instances.required: (none) -> false",
     ),
     ("format = 'glb'", SCENE, "format: source -> glb"),
     ("profile = 'unity'", SCENE, "profile: web -> unity"),
@@ -152,6 +157,7 @@ fn what_is_not_used_is_not_in_the_key() {
     }
     for line in [
         "instances.tolerance = 1e-3",
+        "instances = { cell = 20, names = 'drop', required = false }",
         "jobs = 3",
         "cache = 'x'",
         "ignore_files = true",
@@ -169,7 +175,7 @@ fn the_key_is_the_same_on_every_machine() {
     let [sequence, chain, scene] = keys(&settings(""), MeshParts::ALL);
     insta::assert_snapshot!(sequence, @"f79941682ed73a8b031fab0179930971d12b172857f7115da3a8a70c9eb87cae");
     insta::assert_snapshot!(chain, @"d5d6e4f1c466b5baee12a9e328378c95bf928fcbb89451d611088a54da8cb17d");
-    insta::assert_snapshot!(scene, @"3d44ac5c0fb5eea9864f6fba51afb101c459af3e2e23b8889ef7f667098fcd49");
+    insta::assert_snapshot!(scene, @"a6352f00c12400308916af147e588602c6f11519d7fe2259c1e9a960e6983c16");
     assert_eq!(sequence.to_string().parse(), Ok(sequence));
     assert!("x".parse::<JobKey>().is_err());
 }

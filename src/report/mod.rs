@@ -9,6 +9,8 @@ pub mod inspection;
 mod json;
 mod table;
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -112,6 +114,20 @@ pub struct SceneRecord {
     /// What it takes to load and draw it. Absent where nothing was read, and in records of earlier versions.
     #[serde(default)]
     pub costs: Option<SceneCosts>,
+    /// Nodes that became batches of instances. Absent where that is not asked for.
+    #[serde(default)]
+    pub batches: Option<BatchesRecord>,
+}
+
+/// Nodes that show the same mesh, written as batches of `EXT_mesh_gpu_instancing`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct BatchesRecord {
+    /// Batches written.
+    pub batches: u64,
+    /// Nodes of the source that they draw.
+    pub instances: u64,
+    /// How many nodes stay nodes although others show the same mesh, by the reason.
+    pub stayed: BTreeMap<String, u64>,
 }
 
 /// What it takes to load and draw a scene, beside its triangles.

@@ -2,11 +2,12 @@
 //!
 //! At most 80 columns, plain text: it reads the same in a log, in a pipe and without colour.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
-use super::{LevelRecord, MeshRecord, Report, Stop};
+use super::{BatchesRecord, LevelRecord, MeshRecord, Report, Stop};
 use crate::config::{ErrorUnit, LevelTarget};
 use crate::progress::Summary;
 use crate::progress::quantity::{bytes, count, duration, plural};
@@ -73,6 +74,7 @@ fn figures(report: &Report, summary: &Summary, wall: Duration) -> String {
         let (found, recovered) = (count(totals.instances_found), count(totals.instances_recovered));
         rows.push(vec!["instances".to_owned(), format!("{recovered} recovered of {found} found{residual}")]);
     }
+    rows.extend(batches(report));
     let looks = Duration::from_millis(summary.looks_milliseconds);
     if !looks.is_zero() && looks <= wall {
         let share = looks.as_secs_f64() / wall.as_secs_f64();
@@ -85,6 +87,27 @@ fn figures(report: &Report, summary: &Summary, wall: Duration) -> String {
         rows.push(vec!["warnings".to_owned(), count(summary.warnings)]);
     }
     columns(&[], rows, &[])
+}
+
+/// `1,296 nodes in 12 batches`; `40`, most of them with the reason why they are no part of any.
+fn batches(report: &Report) -> Vec<Vec<String>> {
+    let scenes: Vec<&BatchesRecord> = report.scenes.iter().filter_map(|scene| scene.batches.as_ref()).collect();
+    if scenes.is_empty() {
+        return Vec::new();
+    }
+    let mut stayed: BTreeMap<&str, u64> = BTreeMap::new();
+    for (why, number) in scenes.iter().flat_map(|scene| &scene.stayed) {
+        *stayed.entry(why).or_insert(0) += number;
+    }
+    let (nodes, batches) = scenes.iter().fold((0, 0), |sums, s| (sums.0 + s.instances, sums.1 + s.batches));
+    let batches = if batches == 1 { "1 batch".to_owned() } else { format!("{} batches", count(batches)) };
+    let mut rows = vec![vec!["batches".to_owned(), format!("{} in {batches}", plural(nodes, "node"))]];
+    if let Some((why, most)) = stayed.iter().rev().max_by_key(|(_, most)| **most) {
+        let all = count(stayed.values().sum());
+        let words = if stayed.len() == 1 { all } else { format!("{all}; {} of them", count(*most)) };
+        rows.push(vec!["stay nodes".to_owned(), format!("{words}: {why}")]);
+    }
+    rows
 }
 
 /// ` (13.7 times less)`, when there is something to save.

@@ -64,6 +64,7 @@ fn scene(path: &str, status: Status, meshes: Vec<MeshRecord>) -> SceneRecord {
         outputs: vec![],
         meshes,
         costs: None,
+        batches: None,
     }
 }
 

@@ -88,6 +88,76 @@ fn what_is_not_asked_for_is_told_and_left() {
     assert_eq!(kept, "`recover` does not ask for it");
 }
 
+/// A field of hills without names: 60 near each other, 3 far away, one with `extras`.
+fn field() -> Scene {
+    let mut scene = Scene::new();
+    let hill = scene.mesh("hill", &Shape::grid(12, 0.2));
+    for i in 0..60u8 {
+        scene.nameless(hill, [f32::from(i % 10), f32::from(i / 10), 0.0]);
+    }
+    for i in 0..3u8 {
+        scene.nameless(hill, [60.0, 60.0, f32::from(i)]);
+    }
+    let last = scene.nameless(hill, [0.0; 3]);
+    scene.set(last, "extras", json!({ "id": 1 }));
+    scene
+}
+
+#[test]
+fn batches_switch_levels_as_one_and_the_report_tells_what_is_none() {
+    let space = Space::new();
+    let pipeline = |settings: &str| {
+        format!(
+            "input = 'scenes'\noutput = 'out'\n[instances]\ninstancing = 'gpu'\n{settings}\n[[lod]]\nratio = 0.5\n[[lod]]\nratio = 0.2\n"
+        )
+    };
+    space.write("pipeline.toml", pipeline(""));
+    space.write("scenes/field.glb", field().glb());
+    space.write("scenes/field.gltf", field().gltf());
+    let told = space.run_fine(&["pipeline.toml"]);
+    assert!(told.stderr.contains("120 nodes in 2 batches"), "{}", told.stderr);
+    assert!(told.stderr.contains("stay nodes    8; 6 of them: too few"), "{}", told.stderr);
+    let document = space.json("out/field.gltf");
+    assert_eq!(document["extensionsRequired"], json!(["EXT_mesh_gpu_instancing"]));
+    let nodes = document["nodes"].as_array().unwrap();
+    assert_eq!((&nodes[0]["translation"][0], &nodes[0]["translation"][1]), (&json!(5.0), &json!(3.0)));
+    let child = &nodes[nodes[0]["children"][0].as_u64().unwrap() as usize];
+    let batch = &child["extensions"]["EXT_mesh_gpu_instancing"];
+    let count = |name: &str| {
+        let accessor = batch["attributes"][name].as_u64().unwrap() as usize;
+        document["accessors"][accessor]["count"].as_u64().unwrap()
+    };
+    assert_eq!(["TRANSLATION", "ROTATION", "SCALE"].map(count), [60; 3]);
+    let levels = child["extensions"]["MSFT_lod"]["ids"].as_array().unwrap();
+    assert_eq!(levels.len(), 2);
+    for level in levels {
+        assert_eq!(&nodes[level.as_u64().unwrap() as usize]["extensions"]["EXT_mesh_gpu_instancing"], batch);
+    }
+    // What stays has its index.
+    assert_eq!((&nodes[63]["extras"]["id"], &nodes[59]), (&json!(1), &json!({})));
+    let record = space.json("out/report.json")["scenes"][0].clone();
+    assert_eq!((&record["batches"]["batches"], &record["batches"]["instances"]), (&json!(1), &json!(60)));
+    assert_eq!((&record["meshes"][0]["instances"], &record["meshes"][0]["draw_calls"]), (&json!(64), &json!(5)));
+    assert_eq!(record["batches"]["stayed"]["they have `extras` or a camera"], 1);
+    assert!(space.run_fine(&["pipeline.toml"]).stderr.contains("no work"));
+    // The same scene by the eye of the program itself.
+    let told = space.run_fine(&[
+        "--json",
+        "evaluate",
+        "--size",
+        "64",
+        "--samples",
+        "100",
+        "scenes/field.glb",
+        "out/field.glb",
+    ]);
+    let d_rms = &told.document()["candidates"][0]["d_rms"];
+    assert!(d_rms.as_f64().unwrap() < 0.05, "{d_rms}");
+    space.write("pipeline.toml", pipeline("required = false"));
+    space.run_fine(&["pipeline.toml"]);
+    assert_eq!(space.json("out/field.gltf").get("extensionsRequired"), None);
+}
+
 #[test]
 fn the_same_bytes_with_any_number_of_threads_and_nothing_to_do_after_it() {
     let (one, many) = (space(RECOVER), space(RECOVER));

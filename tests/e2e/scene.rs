@@ -141,6 +141,18 @@ impl Scene {
         node
     }
 
+    /// Appends a node of the scene without a name; answers its index.
+    pub fn nameless(&mut self, mesh: usize, translation: [f32; 3]) -> usize {
+        let node = self.node("", mesh, translation);
+        self.json["nodes"][node].as_object_mut().expect("it is an object").shift_remove("name");
+        node
+    }
+
+    /// Gives a node a member.
+    pub fn set(&mut self, node: usize, key: &str, value: Value) {
+        self.json["nodes"][node][key] = value;
+    }
+
     fn accessor(&mut self, bytes: &[u8], count: usize, kind: &str, component: u32) -> usize {
         let view = self.push(
             "bufferViews",

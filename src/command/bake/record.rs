@@ -8,6 +8,7 @@ use serde_json::Value;
 use super::recover::Instance;
 use super::wave::ReadScene;
 use crate::appearance::images::ImageFacts;
+use crate::gltf::fold::Folded;
 use crate::gltf::scene::{Scene, SourceMesh};
 use crate::identify::SubMesh;
 use crate::identify::alike::Match;
@@ -16,8 +17,8 @@ use crate::mesh::hash::MeshHash;
 use crate::mesh::{Level, LevelVertices};
 use crate::plan::MeshPlan;
 use crate::report::{
-    ImageRecord, InstanceRecord, LevelRecord, MeshRecord, PieceLevel, PieceRecord, Problem, SceneCosts, SceneRecord,
-    Severity, Status,
+    BatchesRecord, ImageRecord, InstanceRecord, LevelRecord, MeshRecord, PieceLevel, PieceRecord, Problem, SceneCosts,
+    SceneRecord, Severity, Status,
 };
 use crate::scan::SceneFile;
 use crate::work::{Baked, LevelLook};
@@ -30,7 +31,7 @@ pub struct SceneFacts {
 }
 
 /// First byte of remembered facts; another one means another shape of [`SceneFacts`].
-const VERSION: u8 = 5;
+const VERSION: u8 = 6;
 
 /// For the index.
 pub fn to_bytes(facts: &SceneFacts) -> Vec<u8> {
@@ -57,6 +58,7 @@ impl SceneFacts {
             outputs: Vec::new(),
             meshes: Vec::new(),
             costs: None,
+            batches: None,
         };
         Self { record, problems }
     }
@@ -127,6 +129,15 @@ fn instance(instance: &Instance) -> InstanceRecord {
         scale: by.scale,
         residual: *residual,
         kept: instance.kept.map(str::to_owned),
+    }
+}
+
+/// What became of nodes that show the same mesh.
+pub fn batches(folded: &Folded) -> BatchesRecord {
+    BatchesRecord {
+        batches: folded.batches as u64,
+        instances: folded.instances as u64,
+        stayed: folded.stayed.iter().map(|(why, count)| ((*why).to_owned(), *count as u64)).collect(),
     }
 }
 

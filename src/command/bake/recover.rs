@@ -1,17 +1,21 @@
-//! Instances that nobody declared: finds them in a scene that was read, and makes it the scene that declares them.
+//! Instances: finds those that nobody declared in a scene that was read, and makes it the scene that declares them, in the form that
+//! is asked for.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::config::{InstanceSettings, Recover};
+use crate::config::{InstanceSettings, Instancing, Recover};
+use crate::gltf::dependencies::dependencies;
 use crate::gltf::document::DocumentError;
+use crate::gltf::fold::{Folded, Sphere, fold};
 use crate::gltf::read::from_document;
-use crate::gltf::scene::Scene;
+use crate::gltf::scene::{Scene, SourceMesh};
 use crate::gltf::share::{Copy, Note, Sharing, share};
 use crate::identify::alike::{Kind, Match, find};
 use crate::identify::{SubMesh, sub_meshes};
+use crate::mesh::layout::frame;
 
 /// A mesh that is another one, moved.
 #[derive(Clone, Debug)]
@@ -30,6 +34,8 @@ pub struct Recovered {
     pub sub_meshes: Vec<Vec<SubMesh>>,
     /// By mesh.
     pub instances: BTreeMap<usize, Instance>,
+    /// Nodes that became batches, where that is asked for.
+    pub folded: Option<Folded>,
     /// Something was changed.
     pub is_changed: bool,
     /// What a user should know.
@@ -38,9 +44,29 @@ pub struct Recovered {
 
 /// Finds instances and declares those that the settings ask for. `base` is the scene's folder.
 pub fn recover(scene: Scene, settings: &InstanceSettings, base: &Path) -> Result<Recovered, DocumentError> {
+    let mut out = declare(scene, settings, base)?;
+    if settings.instancing == Instancing::Gpu {
+        let spheres: Vec<Option<Sphere>> = out.scene.meshes.iter().map(sphere).collect();
+        let folded = fold(&mut out.scene.document, &mut out.scene.buffers, &spheres, settings)?;
+        if 0 < folded.batches {
+            out.is_changed = true;
+            // A buffer that grew is no file any more.
+            out.scene.dependencies = dependencies(&out.scene.document, base);
+        }
+        out.folded = Some(folded);
+    }
+    Ok(out)
+}
+
+fn sphere(mesh: &SourceMesh) -> Option<Sphere> {
+    let (middle, radius) = frame(mesh.triangle_primitives().map(|(_, primitive)| primitive));
+    (0 < mesh.triangles()).then(|| (middle.into(), radius))
+}
+
+fn declare(scene: Scene, settings: &InstanceSettings, base: &Path) -> Result<Recovered, DocumentError> {
     let subs: Vec<Vec<SubMesh>> = scene.meshes.par_iter().map(sub_meshes).collect();
-    let mut out =
-        Recovered { scene, sub_meshes: subs, instances: BTreeMap::new(), is_changed: false, notes: Vec::new() };
+    let instances = BTreeMap::new();
+    let mut out = Recovered { scene, sub_meshes: subs, instances, folded: None, is_changed: false, notes: Vec::new() };
     if settings.recover == Recover::None {
         return Ok(out);
     }
@@ -68,7 +94,7 @@ pub fn recover(scene: Scene, settings: &InstanceSettings, base: &Path) -> Result
     // What was odd in the source is told once, as it stood there.
     let scene = Scene { warnings, ..from_document(document, shared.buffers, base)? };
     let sub_meshes = scene.meshes.par_iter().map(sub_meshes).collect();
-    Ok(Recovered { scene, sub_meshes, instances: out.instances, is_changed: true, notes: shared.notes })
+    Ok(Recovered { scene, sub_meshes, is_changed: true, notes: shared.notes, ..out })
 }
 
 fn refused(kind: Kind, recover: Recover) -> Option<&'static str> {

@@ -19,6 +19,7 @@ use crate::config::Format;
 use crate::emit::{Content, Emission, Emitted, EmittedFile, OutputFolder};
 use crate::gltf::dependencies::{Dependency, DependencyKind, dependencies};
 use crate::gltf::document::{Container, Document, DocumentError};
+use crate::gltf::fold::Folded;
 use crate::gltf::instancing;
 use crate::gltf::lod::{MeshLevel, MeshLevels, PrimitiveLevel, WriteError, add_levels, is_sealed, switches};
 use crate::gltf::package::Package;
@@ -66,6 +67,8 @@ pub struct ReadScene {
     pub sub_meshes: Vec<Vec<SubMesh>>,
     /// Meshes that are others, moved, by mesh.
     pub instances: BTreeMap<usize, Instance>,
+    /// Nodes that became batches.
+    folded: Option<Folded>,
     /// Some of these are declared now: the document is not the source's.
     is_changed: bool,
     /// Of the search for them.
@@ -297,11 +300,12 @@ fn read_scene(todo: Todo) -> Result<ReadScene, Failure> {
         .filter_map(|d| beside.iter().find(|(path, _)| *path == d.path)?.1.seen.as_ref())
         .map(|seen| seen.stat.size)
         .sum();
-    let Recovered { scene, sub_meshes, instances, is_changed, notes } =
+    let Recovered { scene, sub_meshes, instances, folded, is_changed, notes } =
         recover(scene, &todo.settings.instances, base).map_err(refused)?;
     let uses = mesh_uses(&scene.document).map_err(refused)?;
     Ok(ReadScene {
         instances,
+        folded,
         is_changed,
         notes,
         looks: mesh_looks(&scene, &sub_meshes, &beside, &todo),
@@ -376,6 +380,7 @@ fn write_scene(scene: ReadScene, baked: &Baked, output: &OutputFolder, root: &Pa
         outputs: Vec::new(),
         meshes: record::meshes(&scene, baked, |radius, errors| switches(radius, errors, settings)),
         costs: None,
+        batches: scene.folded.as_ref().map(record::batches),
     };
     let mut costs = record::costs(&scene.scene, &record.meshes, &scene.images);
     let unknown_images = (0..).zip(&scene.images).filter(|(_, image)| 0 < image.bytes && image.size.is_none());

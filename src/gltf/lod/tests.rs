@@ -257,9 +257,9 @@ fn instances_are_drawn_at_every_level_and_switch_as_one() {
         assert_eq!(member["extensions"]["EXT_mesh_gpu_instancing"], instancing);
         assert!(member["extensions"].get("EXT_instance_features").is_some());
     }
-    // Origins lie on the square: half its diagonal, plus the mesh about its own origin.
+    // Middles lie on a square of side 1.5, since scales are translations too: half its diagonal, plus the mesh.
     let radius = nodes[1]["extras"]["lodbake"]["radius"].as_f64().unwrap();
-    assert!((radius - (0.5_f64.sqrt() + 0.75 + 0.5_f64.sqrt())).abs() < 1e-6, "{radius}");
+    assert!((radius - (1.5 * 0.5_f64.sqrt() + 0.75)).abs() < 1e-6, "{radius}");
 }
 
 #[test]

@@ -8,11 +8,10 @@ use crate::gltf::buffers::Buffers;
 use crate::gltf::decode::meshopt;
 use crate::gltf::document::Document;
 use crate::gltf::error::DocumentError;
-use crate::gltf::{json, package, uri};
+use crate::gltf::json;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::sync::Arc;
 
 /// Every cut is a multiple of it.
 const GRAIN: usize = 8;
@@ -241,15 +240,7 @@ fn cut(document: &mut Document, buffers: &Buffers, cuts: &[Cuts]) -> Result<Buff
             at = cut.end;
         }
         kept.extend_from_slice(&bytes[at..]);
-        let entry = &mut document.array_mut("buffers")?[i];
-        entry["byteLength"] = json!(kept.len());
-        let address = entry.get("uri").and_then(Value::as_str).map(uri::form);
-        match address {
-            Some(uri::Form::Data) => entry["uri"] = json!(package::data_uri(&kept)),
-            Some(_) => drop(entry.as_object_mut().and_then(|entry| entry.shift_remove("uri"))),
-            None => document.bin = Some(Arc::from(kept.as_slice())),
-        }
-        out.replace(i, kept);
+        out.rewrite(document, i, kept)?;
     }
     Ok(out)
 }
