@@ -1,7 +1,7 @@
 //! From a mesh to the recorded sequence of its contractions.
 //!
-//! The [`driver`] takes the cheapest legal pair, contracts it, writes it down, until nothing is left to contract; large surfaces
-//! are done in [`blocks`] first, side by side, if the metric can. One run makes the whole sequence; every level is a cut of it
+//! The `driver` takes the cheapest legal pair, contracts it, writes it down, until nothing is left to contract; large surfaces
+//! are done in `blocks` first, side by side, if the metric can. One run makes the whole sequence; every level is a cut of it
 //! ([`progressive`]).
 
 mod blocks;
