@@ -1,8 +1,9 @@
 //! Large surfaces, block by block and side by side.
 //!
 //! The faces are parted in space into blocks, each is simplified as if it were alone, but for the vertices that it shares
-//! with others, which take part in no pair. What was done in all blocks is then done again in the whole surface, the
-//! cheapest first, until few enough faces are left; what would go beyond that is forgotten. Again with other blocks, until
+//! with others, which take part in no pair. What was done in all blocks is then taken into the sequence, the
+//! cheapest first, until few enough faces are left, and the whole surface is made anew from it; what would go beyond that is
+//! forgotten. Again with other blocks, until
 //! the surface is no longer large; the rest, and what was left standing between blocks, is the finishing run's.
 //!
 //! Blocks depend on the surface alone, never on the number of threads. A pair in a block has all faces of both its vertices
