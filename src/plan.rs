@@ -228,7 +228,7 @@ fn write_look(look: &MeshLook, to: &mut dyn ManifestWriter) {
 /// Factors of the weights of normals and texture coordinates, the most useful first: which weights suit a mesh depends on
 /// how clean its normals are and how busy its textures.
 const FACTORS: [(f64, f64); 7] =
-    [(1.0, 1.0), (6.0, 1.0), (20.0, 1.0), (1.0, 3.0), (1.0 / 6.0, 1.0), (6.0, 3.0), (1.0, 1.0 / 6.0)];
+    [(1.0, 1.0), (6.0, 1.0), (1.0, 1.0 / 6.0), (20.0, 1.0), (1.0, 3.0), (1.0 / 6.0, 1.0), (6.0, 3.0)];
 
 /// Rounds of effort `best`: after four, pictures hardly get better.
 const ROUNDS: usize = 4;

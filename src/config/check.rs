@@ -218,7 +218,13 @@ impl<'a> Document<'a> {
 
 fn syntax(file: &str, text: &str, error: &toml::de::Error) -> ConfigError {
     let line = error.span().map_or(1, |span| line(text, &span));
-    ConfigError::Syntax { file: file.to_owned(), line, cause: error.message().trim().replace('\n', ", ") }
+    let mut cause = error.message().trim().replace('\n', ", ");
+    if cause == "duplicate key"
+        && let Some(key) = error.span().and_then(|span| text.get(span))
+    {
+        cause = format!("{cause} `{key}`");
+    }
+    ConfigError::Syntax { file: file.to_owned(), line, cause }
 }
 
 /// Counted from 1.

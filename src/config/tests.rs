@@ -118,7 +118,7 @@ fn absent_and_broken() {
     insta::assert_snapshot!(parse("output = 'out'").unwrap_err(), @"missing key `input` in `project/pipeline.toml` line 1");
     insta::assert_snapshot!(refused("[[override]]\nskip = true"), @"missing key `override[0].match` in `project/pipeline.toml` line 3");
     insta::assert_snapshot!(refused("jobs ="), @"`project/pipeline.toml` line 3: string values must be quoted, expected literal string");
-    insta::assert_snapshot!(refused("jobs = 1\njobs = 2"), @"`project/pipeline.toml` line 4: duplicate key");
+    insta::assert_snapshot!(refused("jobs = 1\njobs = 2"), @"`project/pipeline.toml` line 4: duplicate key `jobs`");
     let missing = Pipeline::load(Path::new("no/such/pipeline.toml")).unwrap_err();
     assert!(missing.to_string().starts_with("failed to read `no/such/pipeline.toml`: "), "{missing}");
     insta::assert_snapshot!(missing.hint().unwrap(), @"`lodbake init` writes a commented `pipeline.toml`");

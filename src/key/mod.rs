@@ -19,7 +19,7 @@ pub use jobs::{MeshParts, SequenceJob, write_chain};
 pub const FORMAT_VERSION: u32 = 3;
 
 /// Simplification and levels. Raise it in the commit that changes any bytes for the same mesh and settings.
-pub const ALGORITHM_VERSION: u32 = 7;
+pub const ALGORITHM_VERSION: u32 = 8;
 
 /// How looks are measured. Raise it in the commit that changes any figure for the same pictures' subject.
 pub const LOOK_VERSION: u32 = 1;

@@ -173,9 +173,9 @@ fn what_is_not_used_is_not_in_the_key() {
 #[test]
 fn the_key_is_the_same_on_every_machine() {
     let [sequence, chain, scene] = keys(&settings(""), MeshParts::ALL);
-    insta::assert_snapshot!(sequence, @"f79941682ed73a8b031fab0179930971d12b172857f7115da3a8a70c9eb87cae");
-    insta::assert_snapshot!(chain, @"d5d6e4f1c466b5baee12a9e328378c95bf928fcbb89451d611088a54da8cb17d");
-    insta::assert_snapshot!(scene, @"a6352f00c12400308916af147e588602c6f11519d7fe2259c1e9a960e6983c16");
+    insta::assert_snapshot!(sequence, @"977ade5e909e7dda168da923a07a9ec468cda16142ad404788993576b0832d47");
+    insta::assert_snapshot!(chain, @"505991637f50ddd66570258de7a21a65c14f9b271d47dff4466dc1bd7360d7a9");
+    insta::assert_snapshot!(scene, @"d988e5d2e03931667f1d51bd82ff3a8a7666c0ee577bf3772a768d1464898cbd");
     assert_eq!(sequence.to_string().parse(), Ok(sequence));
     assert!("x".parse::<JobKey>().is_err());
 }
