@@ -12,10 +12,11 @@ use lodbake::gltf::{json, rules};
 use std::path::Path;
 
 /// Levels in both kinds of storage, in both containers.
-fn pipeline(corpus: &Path) -> String {
+fn pipeline(corpus: &Path, output: &str, layout: &str) -> String {
     format!(
         "input = {input:?}\n\
-         output = 'out'\n\
+         output = '{output}'\n\
+         layout = '{layout}'\n\
          appearance.size = 48\n\
          include = ['features/**/*.gl*', 'scenes/**/*.gl*']\n\
          lod = [{{ ratio = 0.5 }}, {{ ratio = 0.25 }}, {{ ratio = 0.1 }}]\n\
@@ -61,10 +62,13 @@ fn levels(scene: &Scene, place: &str) -> usize {
 fn every_bake_of_the_corpus_keeps_the_rules() {
     let Some(corpus) = corpus() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("pipeline.toml");
-    std::fs::write(&file, pipeline(&corpus)).unwrap();
-    let run = assert_cmd::Command::cargo_bin("lodbake").unwrap().arg(&file).output().unwrap();
-    let told = String::from_utf8_lossy(&run.stderr).into_owned();
+    let bake = |output: &str, layout: &str| {
+        let file = folder.path().join("pipeline.toml");
+        std::fs::write(&file, pipeline(&corpus, output, layout)).unwrap();
+        let run = assert_cmd::Command::cargo_bin("lodbake").unwrap().arg(&file).output().unwrap();
+        String::from_utf8_lossy(&run.stderr).into_owned()
+    };
+    let told = bake("out", "self-contained");
     let output = folder.path().join("out");
     let (mut checked, mut total) = (0, 0);
     for path in scenes(&output) {
@@ -78,5 +82,22 @@ fn every_bake_of_the_corpus_keeps_the_rules() {
         total += levels(&after, &place);
     }
     println!("{checked} outputs, {total} levels");
+    // Where the bytes are changes nothing of what is read.
+    bake("parted", "library");
+    let mut shared = 0;
+    for path in scenes(&output) {
+        let below = path.strip_prefix(&output).unwrap();
+        let (one, other) = (read(&path).unwrap(), read(&folder.path().join("parted").join(below)).unwrap());
+        let place = below.display();
+        assert!(one.meshes == other.meshes, "{place}: other geometry");
+        for (name, value) in one.document.json.as_object().unwrap() {
+            if !["accessors", "buffers", "bufferViews", "images", "meshes"].contains(&name.as_str()) {
+                assert_eq!(Some(value), other.document.json.get(name), "{place}: {name}");
+            }
+        }
+        shared += other.dependencies.iter().filter(|file| file.uri.contains("lodbake-library/")).count();
+    }
+    println!("{shared} references to the library");
+    assert!(shared > 200, "{shared}");
     assert!(checked > 100 && total > 1000, "{checked} outputs, {total} levels\n{told}");
 }

@@ -21,6 +21,8 @@ mod init;
 mod inspect;
 #[path = "e2e/instances.rs"]
 mod instances;
+#[path = "e2e/library.rs"]
+mod library;
 #[path = "e2e/methods.rs"]
 mod methods;
 #[path = "e2e/report.rs"]

@@ -113,6 +113,18 @@ choice! {
 }
 
 choice! {
+    /// Where the geometry of meshes with levels is kept.
+    Layout {
+        /// In each scene's own files: an output can be moved and sent alone.
+        #[default]
+        SelfContained = "self-contained",
+        /// In files that scenes share, `lodbake-library/HASH.bin` in the output folder: a mesh that many scenes have is written
+        /// once, levels and all, and each of them refers to it. Only the whole output folder can be moved.
+        Library = "library",
+    }
+}
+
+choice! {
     /// The reader that the outputs are written for.
     Profile {
         /// three.js, Babylon.js and other readers of `MSFT_lod`.

@@ -8,7 +8,9 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::budget::BudgetEntry;
-use super::choice::{Effort, ErrorUnit, Format, Instancing, Metric, NodeNames, Placement, Profile, Recover, Storage};
+use super::choice::{
+    Effort, ErrorUnit, Format, Instancing, Layout, Metric, NodeNames, Placement, Profile, Recover, Storage,
+};
 use super::defaults;
 
 /// A string or a list of strings.
@@ -75,6 +77,10 @@ pub(super) struct PipelineFile {
     /// Where the vertices of the levels are kept. Default: smallest.
     #[schemars(extend("default" = Storage::default()))]
     pub storage: Option<Storage>,
+
+    /// Whether scenes share the files that hold the geometry of meshes with levels. Default: self-contained.
+    #[schemars(extend("default" = Layout::default()))]
+    pub layout: Option<Layout>,
 
     /// The reader that the outputs are written for. Default: web.
     #[schemars(extend("default" = Profile::default()))]
@@ -286,6 +292,9 @@ pub(super) struct OverrideEntry {
 
     /// As the key of the same name above.
     pub storage: Option<Storage>,
+
+    /// As the key of the same name above.
+    pub layout: Option<Layout>,
 
     /// As the key of the same name above.
     pub profile: Option<Profile>,

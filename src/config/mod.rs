@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 
 pub use budget::{Bounds, Budget, Fact, Limit};
 pub use choice::{
-    Effort, ErrorUnit, Format, Instancing, Metric, NodeNames, Placement, Profile, Recover, Renderer, Storage,
+    Effort, ErrorUnit, Format, Instancing, Layout, Metric, NodeNames, Placement, Profile, Recover, Renderer, Storage,
 };
 pub use error::{ConfigError, Names, Place};
 pub use file::schema;

@@ -4,7 +4,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use super::check::Document;
-use super::choice::{ErrorUnit, Placement, Storage};
+use super::choice::{ErrorUnit, Layout, Placement, Storage};
 use super::error::{ConfigError, Place};
 use super::file::{
     AppearanceTable, InstancesTable, LodEntry, OneOrMany, OverrideEntry, PipelineFile, ScreenTable, SimplifyTable,
@@ -22,6 +22,7 @@ pub(super) struct Layer {
     skip: Option<bool>,
     format: Option<super::Format>,
     storage: Option<Storage>,
+    layout: Option<Layout>,
     profile: Option<super::Profile>,
     vertex_cache: Option<bool>,
     screen: ScreenTable,
@@ -39,7 +40,7 @@ macro_rules! lay {
 impl Layer {
     /// Keys of `over` win.
     pub fn lay(&mut self, over: &Self) {
-        lay!(over, self; skip, format, storage, profile, vertex_cache, lod);
+        lay!(over, self; skip, format, storage, layout, profile, vertex_cache, lod);
         lay!(over.screen, self.screen; pixels, height, fov);
         lay!(over.simplify, self.simplify; metric, effort, normal, texcoord, color, border, seam, crease);
         lay!(over.simplify, self.simplify; placement, min_triangles, lock_border, candidates);
@@ -63,6 +64,7 @@ impl Layer {
             chain: ChainSettings { levels, storage, vertex_cache: self.vertex_cache.unwrap_or(true) },
             emit: EmitSettings {
                 format: self.format.unwrap_or_default(),
+                layout: self.layout.unwrap_or_default(),
                 profile: self.profile.unwrap_or_default(),
                 screen: Screen {
                     pixels: self.screen.pixels.unwrap_or(defaults::PIXELS),
@@ -136,6 +138,7 @@ pub(super) fn pipeline(document: &Document<'_>, file: &str) -> Result<Pipeline, 
         skip: None,
         format: typed.format,
         storage: typed.storage,
+        layout: typed.layout,
         profile: typed.profile,
         vertex_cache: typed.vertex_cache,
         screen: typed.screen.unwrap_or_default(),
@@ -176,6 +179,7 @@ fn override_layer(document: &Document<'_>, place: &Place, entry: OverrideEntry) 
         skip: entry.skip,
         format: entry.format,
         storage: entry.storage,
+        layout: entry.layout,
         profile: entry.profile,
         vertex_cache: entry.vertex_cache,
         screen: entry.screen.unwrap_or_default(),

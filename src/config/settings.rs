@@ -5,7 +5,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::choice::{Effort, ErrorUnit, Format, Instancing, Metric, NodeNames, Placement, Profile, Recover, Storage};
+use super::choice::{
+    Effort, ErrorUnit, Format, Instancing, Layout, Metric, NodeNames, Placement, Profile, Recover, Storage,
+};
 use super::defaults;
 
 /// Everything that decides what becomes of one scene.
@@ -215,6 +217,9 @@ impl SceneSettings {
 pub struct EmitSettings {
     /// File format of the output.
     pub format: Format,
+    /// Where the geometry of meshes with levels is kept. Absent in records of earlier versions.
+    #[serde(default)]
+    pub layout: Layout,
     /// The reader that the output is written for.
     pub profile: Profile,
     /// Where a level's error must not be seen.

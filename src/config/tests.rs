@@ -51,11 +51,11 @@ fn paths_are_relative_to_the_file() {
 
 #[test]
 fn unknown_keys_name_the_nearest() {
-    insta::assert_snapshot!(refused("sotrage = 'shared'"), @"unknown key `sotrage` in `project/pipeline.toml` line 3 (did you mean `storage`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `instances`, `lod`, `override`, `budget`, `baseline`)");
+    insta::assert_snapshot!(refused("sotrage = 'shared'"), @"unknown key `sotrage` in `project/pipeline.toml` line 3 (did you mean `storage`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `layout`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `instances`, `lod`, `override`, `budget`, `baseline`)");
     insta::assert_snapshot!(refused("[screen]\npixel = 2"), @"unknown key `screen.pixel` in `project/pipeline.toml` line 4 (did you mean `pixels`? known: `pixels`, `height`, `fov`)");
     insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\n[[lod]]\ntriangle = 5"), @"unknown key `lod[1].triangle` in `project/pipeline.toml` line 6 (did you mean `triangles`? known: `ratio`, `triangles`, `error`, `unit`, `pixels`, `size`, `appearance`, `coverage`)");
     insta::assert_snapshot!(refused("normal = 0.1"), @r"
-    unknown key `normal` in `project/pipeline.toml` line 3 (did you mean `format`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `instances`, `lod`, `override`, `budget`, `baseline`)
+    unknown key `normal` in `project/pipeline.toml` line 3 (did you mean `format`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `layout`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `instances`, `lod`, `override`, `budget`, `baseline`)
     hint: `normal` is a key of `[simplify]`
     ");
     insta::assert_snapshot!(refused("[simplify]\nseam = 1\njobs = 2"), @r"

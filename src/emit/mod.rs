@@ -9,8 +9,9 @@ mod error;
 mod stage;
 
 use crate::gltf::dependencies::{Dependency, DependencyKind};
+use crate::gltf::library::{self, LibraryFile};
 use crate::gltf::package::Files;
-use claims::Claims;
+use claims::{Claims, Whose};
 pub use error::EmitError;
 use stage::{Origin, Stage};
 use std::path::{Component, Path, PathBuf};
@@ -71,12 +72,19 @@ impl OutputFolder {
         Self { root: normal(root), claims: Claims::default() }
     }
 
+    /// Path of an output from the folder on, with `/` as separator.
+    pub fn relative(&self, path: &Path) -> String {
+        let path = normal(path);
+        let below = path.strip_prefix(&self.root).unwrap_or(&path);
+        below.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
+    }
+
     /// Refuses scenes that would become the same file; `scenes` are pairs of source and target. Names the first such
     /// pair in the order given.
     pub fn check_targets<'p>(scenes: impl IntoIterator<Item = (&'p Path, &'p Path)>) -> Result<(), EmitError> {
         let claims = Claims::default();
         for (source, target) in scenes {
-            claims.claim(&normal(target), source, None)?;
+            claims.claim(&normal(target), source, Whose::Own)?;
         }
         Ok(())
     }
@@ -99,6 +107,10 @@ impl OutputFolder {
         match scene.content {
             Content::AsSource { .. } => self.stage(&mut stage, scene, scene.target, Origin::File(scene.source))?,
             Content::Files(files) => {
+                // Before anything that refers to them.
+                for file in &files.library {
+                    self.emit_shared(scene, file, &mut emitted)?;
+                }
                 for (name, bytes) in &files.beside {
                     self.stage(&mut stage, scene, &folder.join(name), Origin::Bytes(bytes))?;
                 }
@@ -116,13 +128,29 @@ impl OutputFolder {
         target: &Path,
         origin: Origin<'_>,
     ) -> Result<(), EmitError> {
-        self.claims.claim(&normal(target), scene.source, None)?;
+        self.claims.claim(&normal(target), scene.source, Whose::Own)?;
         if let Origin::Bytes(_) = origin
             && same_file(scene.source, target)
         {
             return Err(EmitError::OverSource { path: scene.source.to_owned() });
         }
         stage.add(target, origin)
+    }
+
+    /// Scenes share files of the library: whoever comes first writes one.
+    fn emit_shared(&self, scene: &Emission<'_>, file: &LibraryFile, emitted: &mut Emitted) -> Result<(), EmitError> {
+        let target = self.root.join(library::FOLDER).join(&file.name);
+        let claim = self.claims.claim(&target, scene.source, Whose::Library)?;
+        let mut done = claim.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some(done) = &*done {
+            emitted.files.push(EmittedFile { written: false, ..done.clone() });
+            return Ok(());
+        }
+        let mut stage = Stage::default();
+        stage.add(&target, Origin::Bytes(&file.bytes))?;
+        *done = stage.commit()?.pop();
+        emitted.files.extend(done.clone());
+        Ok(())
     }
 
     /// Scenes may share a texture: whoever comes first copies it, the others find it done.
@@ -149,7 +177,7 @@ impl OutputFolder {
         if !target.starts_with(&self.root) {
             return Err(EmitError::Outside { uri: dependency.uri.clone(), target, root: self.root.clone() });
         }
-        let claim = self.claims.claim(&target, scene.source, Some(&dependency.path))?;
+        let claim = self.claims.claim(&target, scene.source, Whose::Copy(dependency.path.clone()))?;
         let mut done = claim.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if done.is_none() {
             let mut stage = Stage::default();

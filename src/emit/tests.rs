@@ -69,7 +69,7 @@ impl Space {
 
 fn files(main: &[u8], beside: &[(&str, &[u8])], copied: Vec<Dependency>) -> Content {
     let beside = beside.iter().map(|(name, bytes)| ((*name).to_owned(), bytes.to_vec())).collect();
-    Content::Files(Files { main: main.to_vec(), beside, copied })
+    Content::Files(Files { main: main.to_vec(), beside, copied, library: Vec::new() })
 }
 
 #[test]
@@ -188,6 +188,54 @@ fn a_shared_texture_is_copied_once_and_a_different_one_refused() {
     let other = Dependency { uri: "t.png".into(), path: space.path("in/sub/t.png"), kind: DependencyKind::Image };
     let refused = space.emit("in/sub/c.gltf", "out/c.gltf", &files(b"x", &[], vec![other])).unwrap_err();
     assert!(matches!(refused, EmitError::Taken { .. }), "{refused}");
+}
+
+fn with_library(main: &[u8], name: &str, bytes: &[u8]) -> Content {
+    let library = vec![LibraryFile { name: name.to_owned(), bytes: bytes.to_vec() }];
+    Content::Files(Files { main: main.to_vec(), beside: Vec::new(), copied: Vec::new(), library })
+}
+
+#[test]
+fn a_file_of_the_library_is_written_once_and_before_the_scenes() {
+    let space = Space::new();
+    space.put("in/a.glb", b"1");
+    space.put("in/deep/b.glb", b"2");
+    let first = space.emit("in/a.glb", "out/a.glb", &with_library(b"x", "m.bin", b"mesh")).unwrap();
+    let told = |emitted: &Emitted| -> Vec<(String, bool)> {
+        emitted.files.iter().map(|file| (space.output.relative(&file.path), file.written)).collect()
+    };
+    assert_eq!(told(&first), [("lodbake-library/m.bin".to_owned(), true), ("a.glb".to_owned(), true)]);
+    let old = space.age("out/lodbake-library/m.bin");
+    let second = space.emit("in/deep/b.glb", "out/deep/b.glb", &with_library(b"y", "m.bin", b"mesh")).unwrap();
+    assert_eq!(told(&second), [("lodbake-library/m.bin".to_owned(), false), ("deep/b.glb".to_owned(), true)]);
+    assert_eq!(space.modified("out/lodbake-library/m.bin"), old);
+    // Another run finds it, and mends it where it is damaged.
+    let again = |content: &Content| {
+        let (source, target) = (space.path("in/a.glb"), space.path("out/a.glb"));
+        OutputFolder::new(&space.path("out")).emit(&Emission { source: &source, target: &target, content }).unwrap()
+    };
+    assert!(!again(&with_library(b"x", "m.bin", b"mesh")).files[0].written);
+    space.put("out/lodbake-library/m.bin", b"mosh");
+    assert!(again(&with_library(b"x", "m.bin", b"mesh")).files[0].written);
+    assert_eq!(fs::read(space.path("out/lodbake-library/m.bin")).unwrap(), b"mesh");
+    // Whoever stops in between leaves a file that nobody names, never a name without a file.
+    fs::create_dir_all(space.path("out/c.glb")).unwrap();
+    assert!(space.emit("in/a.glb", "out/c.glb", &with_library(b"z", "n.bin", b"other")).is_err());
+    assert!(space.files().contains(&"lodbake-library/n.bin".to_owned()), "{:?}", space.files());
+    fs::create_dir_all(space.path("out/lodbake-library/o.bin")).unwrap();
+    assert!(space.emit("in/a.glb", "out/d.glb", &with_library(b"z", "o.bin", b"third")).is_err());
+    assert!(!space.files().contains(&"d.glb".to_owned()), "{:?}", space.files());
+    // No scene may have that name for itself.
+    space.put("in/e.glb", b"3");
+    let refused = space.emit("in/e.glb", "out/lodbake-library/m.bin", &files(b"x", &[], vec![])).unwrap_err();
+    assert!(matches!(refused, EmitError::Taken { .. }), "{refused}");
+}
+
+#[test]
+fn outputs_are_named_from_the_folder_on() {
+    let output = OutputFolder::new(Path::new("a/../b/./out"));
+    assert_eq!(output.relative(Path::new("a/../b/./out/c/d.glb")), "c/d.glb");
+    assert_eq!(output.relative(Path::new("b/out/c/../d.glb")), "d.glb");
 }
 
 #[test]

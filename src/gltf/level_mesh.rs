@@ -9,7 +9,7 @@ use super::error::DocumentError;
 use super::json;
 use super::lod::{MeshLevel, PrimitiveLevel};
 use super::notes::Notes;
-use super::write::{LevelProblem, Streams, WriteError};
+use super::write::{LevelProblem, NewBuffer, Streams, WriteError};
 use crate::mesh::{Attribute, Format, LevelOwnVertices, LevelPrimitive, LevelVertices};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -70,6 +70,19 @@ impl<'d> LevelWriter<'d> {
     pub(super) fn new(document: &'d mut Document) -> Result<Self, WriteError> {
         let streams = Streams::open(document)?;
         Ok(Self { document, streams, notes: Notes::default(), written: BTreeMap::new() })
+    }
+
+    /// From now on arrays go behind the bytes of the buffer `home`. What was written elsewhere is written again: each such
+    /// buffer holds all of its meshes.
+    pub(super) fn turn_to(&mut self, home: usize) -> Result<(), WriteError> {
+        self.written.clear();
+        self.streams = Streams::default();
+        self.streams.append_to(self.document, home)
+    }
+
+    /// What was appended to the buffer so far, if anything was.
+    pub(super) fn close(&mut self) -> Result<Option<NewBuffer>, WriteError> {
+        std::mem::take(&mut self.streams).close(self.document)
     }
 
     /// Appends the level's arrays; answers its mesh, which is not appended yet.

@@ -14,6 +14,7 @@
 //! transforms count; without transforms the difference vanishes. Nothing that exists is renumbered; what moves is
 //! written down in `follow` and `instancing`. Knows nothing of how levels are made.
 
+use super::anchors::Anchors;
 use super::carry;
 use super::coverage::{Extent, Thresholds};
 use super::document::Document;
@@ -79,6 +80,8 @@ pub struct Added {
     pub groups: usize,
     /// Content of a buffer that was created or lengthened; it needs an address before the document is complete.
     pub buffer: Option<NewBuffer>,
+    /// The same for the buffers of meshes that have one of their own.
+    pub library: Vec<NewBuffer>,
     /// What was left out or done differently.
     pub notes: Vec<Note>,
 }
@@ -126,9 +129,20 @@ pub fn add_levels(
     batches: &Batches,
     settings: &EmitSettings,
 ) -> Result<Added, WriteError> {
+    add_levels_to(document, levels, &BTreeMap::new(), batches, settings)
+}
+
+/// As [`add_levels`], with buffers for the levels of some meshes: those that [`super::library`] made.
+pub fn add_levels_to(
+    document: &mut Document,
+    levels: &[MeshLevels],
+    homes: &BTreeMap<usize, usize>,
+    batches: &Batches,
+    settings: &EmitSettings,
+) -> Result<Added, WriteError> {
     let mut writer = LevelWriter::new(document)?;
     let chains = chains(writer.document, levels, &mut writer.notes)?;
-    let anchors = Anchors::find(writer.document, &chains, &mut writer.notes)?;
+    let anchors = Anchors::find(writer.document, &chains.keys().copied().collect(), &mut writer.notes)?;
     let used: BTreeSet<usize> = anchors.nodes.iter().map(|&(_, mesh)| mesh).collect();
     let chains: BTreeMap<usize, Chain<'_>> = chains.into_iter().filter(|(mesh, _)| used.contains(mesh)).collect();
     let mut added = Added { groups: anchors.nodes.len(), ..Added::default() };
@@ -136,16 +150,33 @@ pub fn add_levels(
         added.notes = writer.notes.into_vec();
         return Ok(added);
     }
-    if let Some(buffer) = host::find(writer.document, &anchors.nodes.iter().map(|&(node, _)| node).collect())? {
+    // What has a buffer of its own asks for it with its coarsest level: nothing waits for that.
+    let others = anchors.nodes.iter().filter(|(_, mesh)| !homes.contains_key(mesh)).map(|&(node, _)| node).collect();
+    if let Some(buffer) = host::find(writer.document, &others)? {
         writer.streams.append_to(writer.document, buffer)?;
     }
-    let written = write_chains(&mut writer, &chains, &mut added.levels)?;
-    let LevelWriter { document, streams, mut notes, .. } = writer;
+    let mut made = BTreeMap::new();
+    let others =
+        chains.iter().filter(|(mesh, _)| !homes.contains_key(mesh)).map(|(&mesh, chain)| (mesh, chain)).collect();
+    write_arrays(&mut writer, &others, &mut added.levels, &mut made)?;
+    added.buffer = writer.close()?;
+    let mut by_home: BTreeMap<usize, Chains<'_>> = BTreeMap::new();
+    for (mesh, &home) in homes {
+        if let Some(chain) = chains.get(mesh) {
+            by_home.entry(home).or_default().insert(*mesh, chain);
+        }
+    }
+    for (home, chains) in by_home {
+        writer.turn_to(home)?;
+        write_arrays(&mut writer, &chains, &mut added.levels, &mut made)?;
+        added.library.extend(writer.close()?);
+    }
+    let LevelWriter { document, mut notes, .. } = writer;
+    let written = append_meshes(document, made)?;
     let grouping = Grouping { chains: &chains, written: &written, batches, settings };
     let moved = grouping.write(document, &anchors, &mut notes)?;
     follow::follow(document, &moved, &mut notes)?;
     document.use_extension(MSFT_LOD, false).map_err(WriteError::from)?;
-    added.buffer = streams.close(document)?;
     added.notes = notes.into_vec();
     Ok(added)
 }
@@ -196,6 +227,11 @@ fn is_length(value: f64) -> bool {
     value.is_finite() && value >= 0.0
 }
 
+/// Would anything be written for them?
+pub(super) fn has_levels(levels: &MeshLevels) -> bool {
+    levels.levels.iter().any(MeshLevel::is_simplified)
+}
+
 impl MeshLevel {
     /// Is a triangle left, or anything that was never meant to be simplified?
     fn is_simplified(&self) -> bool {
@@ -206,90 +242,19 @@ impl MeshLevel {
     }
 }
 
-/// The nodes that get levels.
-struct Anchors {
-    /// Node and its mesh.
-    nodes: Vec<(usize, usize)>,
-    /// Meshes that are lower levels of groups in the source. A reader may drop such a mesh when a finer level has
-    /// arrived, so it must not be level 0 of anything else.
-    lower_levels: BTreeSet<usize>,
-}
+/// Meshes of which the geometry goes to the same buffer.
+type Chains<'a> = BTreeMap<usize, &'a Chain<'a>>;
 
-impl Anchors {
-    fn find(document: &Document, chains: &BTreeMap<usize, Chain<'_>>, notes: &mut Notes) -> Result<Self, WriteError> {
-        let nodes = document.array("nodes")?;
-        let existing = SourceGroups::find(nodes);
-        let mut anchors = Self { nodes: Vec::new(), lower_levels: BTreeSet::new() };
-        let mut used = BTreeSet::new();
-        for (i, node) in nodes.iter().enumerate() {
-            let Some(mesh) = json::index(node, "mesh", format_args!("nodes[{i}]"))? else { continue };
-            json::array(node, "children", format_args!("nodes[{i}]"))?;
-            if existing.lower.contains(&i) {
-                anchors.lower_levels.insert(mesh);
-            }
-            if !chains.contains_key(&mesh) {
-                continue;
-            }
-            used.insert(mesh);
-            if existing.members.contains(&i) {
-                notes.add(format_args!("nodes[{i}]"), "the source has levels here, which stay as they are");
-            } else {
-                anchors.nodes.push((i, mesh));
-            }
-        }
-        for mesh in chains.keys().filter(|mesh| !used.contains(mesh)) {
-            notes.add(format_args!("meshes[{mesh}]"), "no node uses this mesh, so it gets no levels");
-        }
-        Ok(anchors)
-    }
-}
-
-/// `MSFT_lod` groups that the source brings along.
-pub(super) struct SourceGroups {
-    /// Nodes of all their levels, with everything below them.
-    pub(super) members: BTreeSet<usize>,
-    /// Those of level 1 and lower.
-    lower: BTreeSet<usize>,
-}
-
-impl SourceGroups {
-    pub(super) fn find(nodes: &[Value]) -> Self {
-        let mut groups = Self { members: BTreeSet::new(), lower: BTreeSet::new() };
-        for (i, node) in nodes.iter().enumerate() {
-            let Some(lod) = json::extension(node, MSFT_LOD) else { continue };
-            collect_below(nodes, i, &mut groups.members);
-            for id in indices(lod.get("ids")) {
-                collect_below(nodes, id, &mut groups.lower);
-            }
-        }
-        groups.members.extend(&groups.lower);
-        groups
-    }
-}
-
-fn collect_below(nodes: &[Value], root: usize, found: &mut BTreeSet<usize>) {
-    let mut open = vec![root];
-    while let Some(node) = open.pop() {
-        if node < nodes.len() && found.insert(node) {
-            open.extend(indices(nodes[node].get("children")));
-        }
-    }
-}
-
-fn indices(list: Option<&Value>) -> impl Iterator<Item = usize> {
-    list.and_then(Value::as_array).into_iter().flatten().filter_map(|v| json::integer(v).map(|i| i as usize))
-}
-
-/// Writes the arrays and meshes of all chains: the coarsest level of every mesh first, then the next finer one, each
-/// rank one range of bytes. That is the order in which Babylon.js asks for them.
-fn write_chains(
+/// Writes the arrays of chains: the coarsest level of every mesh first, then the next finer one, each rank one range of
+/// bytes. That is the order in which Babylon.js asks for them.
+fn write_arrays(
     writer: &mut LevelWriter<'_>,
-    chains: &BTreeMap<usize, Chain<'_>>,
+    chains: &Chains<'_>,
     levels: &mut Vec<AddedLevel>,
-) -> Result<BTreeMap<usize, WrittenChain>, WriteError> {
+    made: &mut BTreeMap<usize, Vec<LevelMesh>>,
+) -> Result<(), WriteError> {
     let deepest = chains.values().map(|chain| chain.levels.len()).max().unwrap_or(0);
-    levels.resize(deepest, AddedLevel::default());
-    let mut made: BTreeMap<usize, Vec<LevelMesh>> = BTreeMap::new();
+    levels.resize(deepest.max(levels.len()), AddedLevel::default());
     for rank in 1..=deepest {
         for (&mesh, chain) in chains.iter().filter(|(_, chain)| rank <= chain.levels.len()) {
             let at = chain.levels.len() - rank;
@@ -302,11 +267,19 @@ fn write_chains(
         }
         writer.streams.end_section(writer.document)?;
     }
+    Ok(())
+}
+
+/// Appends the meshes of all chains; their levels come coarsest first.
+fn append_meshes(
+    document: &mut Document,
+    made: BTreeMap<usize, Vec<LevelMesh>>,
+) -> Result<BTreeMap<usize, WrittenChain>, WriteError> {
     let mut written = BTreeMap::new();
     for (mesh, coarsest_first) in made {
         let mut chain = WrittenChain { meshes: Vec::new(), triangles: Vec::new(), targets: Vec::new() };
         for level in coarsest_first.into_iter().rev() {
-            chain.meshes.push(writer.document.push("meshes", level.entry)?);
+            chain.meshes.push(document.push("meshes", level.entry)?);
             chain.triangles.push(level.triangles);
             chain.targets.push(level.targets);
         }

@@ -3,9 +3,10 @@
 //! `document` holds a file without loss; `buffers`, `accessor` and `decode` turn its bytes into numbers; `read` puts
 //! a whole scene together. `lod` appends levels to a document (`write` the binary data, `level_mesh` the meshes,
 //! `follow` whoever pointed at them), `package` makes files of it, and `rules` checks them.
-//! `share` writes instances that were found, `fold` makes batches of nodes that show the same mesh.
+//! `library` keeps geometry in files that scenes share. `share` writes instances that were found, `fold` makes batches of nodes that show the same mesh.
 
 pub mod accessor;
+mod anchors;
 pub mod buffers;
 mod carry;
 mod coverage;
@@ -22,6 +23,7 @@ mod host;
 pub mod instancing;
 pub mod json;
 mod level_mesh;
+pub mod library;
 pub mod lod;
 mod notes;
 pub mod package;

@@ -14,6 +14,7 @@ use super::dependencies::{Dependency, DependencyKind};
 use super::document::{Container, Document};
 use super::error::DocumentError;
 use super::json;
+use super::library::LibraryFile;
 use super::notes::{Note, Notes};
 use super::uri;
 use super::write::{NewBuffer, WriteError};
@@ -36,6 +37,8 @@ pub struct Files {
     pub beside: Vec<(String, Vec<u8>)>,
     /// Files of the source that the document still refers to.
     pub copied: Vec<Dependency>,
+    /// Files that other documents may refer to, too.
+    pub library: Vec<LibraryFile>,
 }
 
 /// A document on its way to files.
@@ -225,7 +228,7 @@ impl Package {
             Container::Gltf => self.document.to_gltf_bytes(),
             Container::Glb => self.document.to_glb_bytes()?,
         };
-        Ok(Files { main, beside, copied: self.dependencies })
+        Ok(Files { main, beside, copied: self.dependencies, library: Vec::new() })
     }
 
     /// A lengthened buffer with the source's bytes before the new ones.

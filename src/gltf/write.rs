@@ -118,7 +118,7 @@ pub struct NewBuffer {
 
 /// Arrays that can share a buffer view. The order is that of the bytes: indices first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Kind {
+pub(super) enum Kind {
     Indices(ComponentType),
     /// With the stride in bytes.
     Vertices(usize),
@@ -132,6 +132,7 @@ struct Pending {
 }
 
 /// Where appended bytes go.
+#[derive(Default)]
 pub(super) struct Streams {
     /// `None` until the buffer is created, when there is something to put into it.
     buffer: Option<usize>,
@@ -146,7 +147,7 @@ pub(super) struct Streams {
 impl Streams {
     /// Bytes go to the BIN chunk of a GLB where buffer 0 stands for it or can be made to; otherwise to a new buffer.
     pub(super) fn open(document: &Document) -> Result<Self, WriteError> {
-        let mut streams = Self { buffer: None, bin_end: None, host_end: 0, data: Vec::new(), section: BTreeMap::new() };
+        let mut streams = Self::default();
         if document.container != super::document::Container::Glb {
             return Ok(streams);
         }
@@ -220,11 +221,16 @@ impl Streams {
 
     fn append(&mut self, document: &mut Document, kind: Kind, bytes: &[u8], entry: Value) -> Result<usize, WriteError> {
         let accessor = document.push("accessors", entry)?;
+        self.adopt(&[accessor], kind, bytes);
+        Ok(accessor)
+    }
+
+    /// Appends the content of accessors that exist: from the end of the section on they are here.
+    pub(super) fn adopt(&mut self, accessors: &[usize], kind: Kind, bytes: &[u8]) {
         let pending = self.section.entry(kind).or_default();
-        pending.accessors.push((accessor, pending.bytes.len()));
+        pending.accessors.extend(accessors.iter().map(|&accessor| (accessor, pending.bytes.len())));
         pending.bytes.extend_from_slice(bytes);
         pending.bytes.resize(pending.bytes.len().next_multiple_of(4), 0);
-        Ok(accessor)
     }
 
     /// Bytes collected so far, this section's included.
@@ -281,8 +287,10 @@ impl Streams {
 
 /// `bufferView` first, as most writers have it.
 fn place(accessor: &mut Value, view: usize, offset: usize) {
-    let Value::Object(entry) = accessor else { unreachable!("`append` pushed an object") };
-    let rest = std::mem::take(entry);
+    let Value::Object(entry) = accessor else { unreachable!("`append` pushed an object, and others were read") };
+    let mut rest = std::mem::take(entry);
+    rest.shift_remove("bufferView");
+    rest.shift_remove("byteOffset");
     entry.insert("bufferView".to_owned(), json!(view));
     if offset > 0 {
         entry.insert("byteOffset".to_owned(), json!(offset));

@@ -25,6 +25,9 @@ use crate::scan::{FileStat, SceneFile};
 pub use reason::Reason;
 pub use store::{FOLDER, IndexError, IndexWarning};
 
+/// Settings of an entry whose scene could not be baked since: no settings have this key.
+const FAILED: JobKey = JobKey([0; 32]);
+
 /// A file as it was when its content was read.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Seen {
@@ -159,6 +162,8 @@ pub struct Index {
     /// Facts of the scenes that were baked in this run; all others are still in the file.
     fresh_facts: BTreeMap<String, Vec<u8>>,
     stored_facts: Option<store::StoredFacts>,
+    /// Outputs of scenes that were baked in this run and have them no more.
+    superseded: Vec<Output>,
     /// The file system's time before any content was read in this run.
     started_ns: OnceLock<i64>,
     is_changed: bool,
@@ -211,7 +216,9 @@ impl Index {
     }
 
     fn look(&self, scene: &SceneFile, settings: &SettingsKey, with_outputs: bool) -> Status<'_> {
-        let Some(entry) = self.entries.get(&scene.relative) else { return Status::New };
+        let Some(entry) = self.entries.get(&scene.relative).filter(|entry| entry.settings != FAILED) else {
+            return Status::New;
+        };
         let mut reasons = Vec::new();
         if entry.settings != settings.key {
             reasons.extend(diff(self.fields(entry), &settings.fields()).into_iter().map(Reason::Settings));
@@ -313,14 +320,26 @@ impl Index {
         let facts_at = store::FactsAt::of(&facts);
         self.fresh_facts.insert(relative.to_owned(), facts);
         let entry = Entry { scene, settings: settings_key, dependencies, meshes, outputs, facts: facts_at, read_ns };
-        self.entries.insert(relative.to_owned(), entry);
+        let outputs: BTreeSet<String> = entry.outputs.iter().map(|output| output.relative.clone()).collect();
+        let before = self.entries.insert(relative.to_owned(), entry);
+        let gone = before.into_iter().flat_map(|before| before.outputs).filter(|o| !outputs.contains(&o.relative));
+        self.superseded.extend(gone);
         self.settings.entry(settings_key).or_insert_with(|| settings.fields());
         self.is_changed = true;
     }
 
-    /// A scene could not be baked: the next run tries again.
+    /// A scene could not be baked: the next run tries again. Its outputs of before are still there, and so is what they refer to: they
+    /// stay known.
     pub fn forget(&mut self, relative: &str) {
-        self.is_changed |= self.entries.remove(relative).is_some();
+        if let Some(entry) = self.entries.get_mut(relative) {
+            entry.settings = FAILED;
+            self.is_changed = true;
+        }
+    }
+
+    /// Takes out the outputs that scenes had before they were baked in this run, and have no more. Another scene may have them.
+    pub fn take_superseded(&mut self) -> Vec<Output> {
+        std::mem::take(&mut self.superseded)
     }
 
     /// Takes out the entries of scenes that are no longer there (or are skipped now), for their outputs.

@@ -124,6 +124,7 @@ impl Index {
             settings: records.settings.into_iter().collect(),
             fresh_facts: BTreeMap::new(),
             stored_facts,
+            superseded: Vec::new(),
             started_ns: OnceLock::new(),
             is_changed: false,
         };

@@ -278,6 +278,27 @@ fn vanished_and_failed_scenes_are_forgotten() {
     let mut index = project.baked();
     index.forget("a.gltf");
     assert_eq!(project.told(&mut index), "new");
+    // But not its outputs, which are still there.
+    index.save().unwrap();
+    let mut index = project.open();
+    assert_eq!(project.told(&mut index), "new");
+    assert_eq!(index.take_vanished([])[0].1.outputs[0].relative, "a.glb");
+}
+
+#[test]
+fn outputs_that_a_scene_has_no_more_are_told_once() {
+    let project = Project::new();
+    let mut index = project.baked();
+    project.bake(&mut index);
+    assert_eq!(index.take_superseded(), []);
+    project.write("out/b.glb", "another output");
+    let before = index.entry("a.gltf").unwrap().clone();
+    let outputs = vec![Output { relative: "b.glb".to_owned(), seen: Seen::read(&project.path("out/b.glb")).unwrap() }];
+    let (scene, dependencies) = (before.scene.clone(), before.dependencies.clone());
+    let bake = Bake { scene, dependencies, meshes: Vec::new(), outputs, facts: Vec::new() };
+    index.record("a.gltf", &project.settings, bake);
+    assert_eq!(index.take_superseded(), before.outputs);
+    assert_eq!(index.take_superseded(), []);
 }
 
 #[test]

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{ALGORITHM_VERSION, EMIT_VERSION, FORMAT_VERSION, Manifest, ManifestWriter};
 use crate::config::{
-    ChainSettings, EmitSettings, InstanceSettings, Instancing, LevelTarget, Metric, Recover, SceneSettings, Screen,
-    SimplifySettings, Weights,
+    ChainSettings, EmitSettings, InstanceSettings, Instancing, Layout, LevelTarget, Metric, Recover, SceneSettings,
+    Screen, SimplifySettings, Weights,
 };
 use crate::mesh::Mesh;
 use crate::mesh::hash::MeshHash;
@@ -152,9 +152,12 @@ fn write_instances(settings: &InstanceSettings, to: &mut dyn ManifestWriter) {
 }
 
 fn write_emit(settings: &EmitSettings, to: &mut dyn ManifestWriter) {
-    let EmitSettings { format, profile, screen, coverage } = settings;
+    let EmitSettings { format, layout, profile, screen, coverage } = settings;
     let Screen { pixels, height, fov } = *screen;
     to.text("format", format.name());
+    if *layout != Layout::SelfContained {
+        to.text("layout", layout.name());
+    }
     to.text("profile", profile.name());
     to.group("screen", |to| {
         to.number("pixels", pixels);

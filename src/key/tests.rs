@@ -41,7 +41,7 @@ const LEVELS: &[&str] = &["chain", "scene"];
 const SCENE: &[&str] = &["scene"];
 
 /// Every setting of a scene, another value for it, and the keys that it must change.
-const CASES: [(&str, &[&str], &str); 27] = [
+const CASES: [(&str, &[&str], &str); 28] = [
     (
         "simplify.metric = 'qem'",
         ALL,
@@ -98,6 +98,7 @@ const CASES: [(&str, &[&str], &str); 27] = [
         "instances.tolerance: (none) -> 1e-5; instances.instancing: (none) -> gpu; instances.cell: (none) -> 20.0; instances.names: (none) -> drop; instances.required: (none) -> false",
     ),
     ("format = 'glb'", SCENE, "format: source -> glb"),
+    ("layout = 'library'", SCENE, "layout: (none) -> library"),
     ("profile = 'unity'", SCENE, "profile: web -> unity"),
     ("screen.pixels = 2", SCENE, "screen.pixels: 1.0 -> 2.0"),
     ("screen = { height = 1, fov = 1 }", SCENE, "screen.height: 1080.0 -> 1.0; screen.fov: 60.0 -> 1.0"),

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{DistinctMesh, FORMAT, MeshRecord, Problem, Report, SceneRecord, Status, Totals};
 use crate::config::SceneSettings;
+use crate::gltf::library;
 use crate::mesh::hash::MeshHash;
 
 impl Report {
@@ -56,8 +57,16 @@ fn totals(scenes: &[SceneRecord], distinct: usize) -> Totals {
         triangles_drawn: (0..=targets).map(|number| at(number, |mesh| mesh.instances)).collect(),
         triangles_stored: (0..=targets).map(|number| at(number, |mesh| u64::from(!mesh.is_recovered()))).collect(),
         bytes_in: scenes.iter().map(|scene| scene.bytes_in).sum(),
-        bytes_out: scenes.iter().map(|scene| scene.bytes_out).sum(),
+        bytes_out: scenes.iter().map(|scene| scene.bytes_out).sum::<u64>() - repeated(scenes),
     }
+}
+
+/// Bytes of library files beyond the first scene that has them: each scene counts what it loads.
+fn repeated(scenes: &[SceneRecord]) -> u64 {
+    let mut known = BTreeSet::new();
+    let outputs = scenes.iter().flat_map(|scene| &scene.outputs);
+    let shared = outputs.filter(|o| o.path.strip_prefix(library::FOLDER).is_some_and(|rest| rest.starts_with('/')));
+    shared.filter(|output| !known.insert(&output.path)).map(|output| output.bytes).sum()
 }
 
 /// Triangles of a mesh as shown for a target; 0 is the source.

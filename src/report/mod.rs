@@ -76,7 +76,7 @@ pub struct Totals {
     pub triangles_stored: Vec<u64>,
     /// Bytes of the source files: scenes and their buffers, not images.
     pub bytes_in: u64,
-    /// Bytes of the outputs: scenes and their buffers, not images.
+    /// Bytes of the outputs: scenes and their buffers, not images; a file of the library once.
     pub bytes_out: u64,
 }
 
@@ -105,9 +105,9 @@ pub struct SceneRecord {
     pub settings: Option<SceneSettings>,
     /// Bytes of the file and its buffers, not of images.
     pub bytes_in: u64,
-    /// Bytes of `outputs`; 0 if there are none.
+    /// Bytes of `outputs` without images, those that it shares with other scenes included; 0 if there are none.
     pub bytes_out: u64,
-    /// Files written for it, relative to the output folder: the scene first, then its buffers.
+    /// Files written for it, relative to the output folder: those that it shares with others, its buffers, and the scene last.
     pub outputs: Vec<OutputRecord>,
     /// One for each mesh of the file, in its order.
     pub meshes: Vec<MeshRecord>,
@@ -138,7 +138,7 @@ pub struct SceneCosts {
     pub draw_calls: u64,
     /// Materials that its meshes use.
     pub materials: u64,
-    /// Bytes of the written scene and its buffers without the images inside them.
+    /// Bytes of the written scene and its buffers, shared ones included, without the images inside them.
     pub geometry_bytes: u64,
     /// One for each entry of `images`.
     pub images: Vec<ImageRecord>,

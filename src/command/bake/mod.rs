@@ -12,6 +12,7 @@ mod recover;
 mod survey;
 mod sweep;
 mod wave;
+mod write;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -31,7 +31,7 @@ pub struct SceneFacts {
 }
 
 /// First byte of remembered facts; another one means another shape of [`SceneFacts`].
-const VERSION: u8 = 6;
+const VERSION: u8 = 7;
 
 /// For the index.
 pub fn to_bytes(facts: &SceneFacts) -> Vec<u8> {

@@ -10,35 +10,30 @@ use super::Session;
 use super::record::{self, SceneFacts};
 use super::recover::{Instance, Recovered, recover};
 use super::survey::Todo;
+use super::write::{Written, write_scene};
 use crate::appearance::assemble;
 use crate::appearance::fingerprint::Fingerprints;
 use crate::appearance::images::{ImageFacts, image_facts};
 use crate::appearance::looks::Looks;
 use crate::cache::{Bucket, Cache, Lookup};
-use crate::config::Format;
-use crate::emit::{Content, Emission, Emitted, EmittedFile, OutputFolder};
+use crate::emit::OutputFolder;
 use crate::gltf::dependencies::{Dependency, DependencyKind, dependencies};
-use crate::gltf::document::{Container, Document, DocumentError};
+use crate::gltf::document::{Document, DocumentError};
 use crate::gltf::fold::Folded;
-use crate::gltf::instancing;
-use crate::gltf::lod::{MeshLevel, MeshLevels, PrimitiveLevel, WriteError, add_levels, is_sealed, switches};
-use crate::gltf::package::Package;
+use crate::gltf::lod::is_sealed;
 use crate::gltf::scene::{Scene, SourceMesh};
 use crate::gltf::share::Note;
 use crate::identify::instances::{MeshUse, mesh_uses};
 use crate::identify::{SubMesh, materials};
 use crate::index::{self, Seen};
 use crate::key::JobKey;
-use crate::lod::Chain;
-use crate::mesh::hash::MeshHash;
 use crate::mesh::layout::frame;
-use crate::mesh::{Level, LevelPrimitive, LevelVertices};
 use crate::obj::{self, is_obj};
 use crate::plan::{MeshLook, MeshPlan, Plan};
 use crate::progress::Event;
-use crate::report::{OutputRecord, Problem, SceneRecord, Severity, Status};
+use crate::report::{Problem, Severity, Status};
 use crate::scan::SceneFile;
-use crate::work::{Baked, work};
+use crate::work::work;
 
 /// Source bytes of one wave: what is in memory at a time is a small multiple of it, or of the largest scene.
 const WAVE_BYTES: u64 = 256 << 20;
@@ -68,31 +63,31 @@ pub struct ReadScene {
     /// Meshes that are others, moved, by mesh.
     pub instances: BTreeMap<usize, Instance>,
     /// Nodes that became batches.
-    folded: Option<Folded>,
+    pub folded: Option<Folded>,
     /// Some of these are declared now: the document is not the source's.
-    is_changed: bool,
+    pub is_changed: bool,
     /// Of the search for them.
-    notes: Vec<Note>,
+    pub notes: Vec<Note>,
     /// By mesh: nodes that show it.
     pub uses: Vec<MeshUse>,
-    images: Vec<ImageFacts>,
+    pub images: Vec<ImageFacts>,
     /// By mesh: radius of its bounding sphere.
     pub radii: Vec<f64>,
     /// By mesh, where looks are measured.
     looks: Vec<Option<MeshLook>>,
     /// By mesh.
     pub plans: Vec<MeshPlan>,
-    seen: Seen,
-    dependencies: Vec<index::Dependency>,
+    pub seen: Seen,
+    pub dependencies: Vec<index::Dependency>,
     /// Scene file and buffers.
-    bytes: u64,
+    pub bytes: u64,
 }
 
 /// Why a scene failed.
-struct Failure {
-    file: Box<SceneFile>,
-    cause: String,
-    hint: Option<String>,
+pub struct Failure {
+    pub file: Box<SceneFile>,
+    pub cause: String,
+    pub hint: Option<String>,
 }
 
 impl Session<'_> {
@@ -344,175 +339,4 @@ fn see(base: &Path, files: &[Dependency]) -> Vec<(PathBuf, index::Dependency)> {
 /// Radius of the bounding sphere of a mesh: half the diagonal of the box of its triangles' primitives.
 fn radius(source: &SourceMesh) -> f64 {
     frame(source.triangle_primitives().map(|(_, primitive)| primitive)).1
-}
-
-/// What was written for a scene.
-struct Written {
-    todo: Todo,
-    facts: SceneFacts,
-    bake: index::Bake,
-    new_files: u64,
-}
-
-/// Where a scene goes: below `root`, at its own place, with the extension of its container.
-pub fn target(root: &Path, relative: &str, format: Format) -> PathBuf {
-    let path = root.join(relative);
-    match format {
-        Format::Source if is_obj(&path) => path.with_extension("glb"),
-        Format::Source => path,
-        Format::Glb => path.with_extension("glb"),
-        Format::Gltf => path.with_extension("gltf"),
-    }
-}
-
-fn write_scene(scene: ReadScene, baked: &Baked, output: &OutputFolder, root: &Path) -> Result<Written, Failure> {
-    let settings = &scene.todo.settings.emit.clone();
-    let relative = scene.todo.file.relative.clone();
-    let levels = levels(&scene, &baked.chains);
-    let is_changed = scene.is_changed || is_obj(&scene.todo.file.path);
-    let mut notes = scene.notes.clone();
-    let mut record = SceneRecord {
-        path: relative.clone(),
-        status: Status::Baked,
-        settings: None,
-        bytes_in: scene.bytes,
-        bytes_out: 0,
-        outputs: Vec::new(),
-        meshes: record::meshes(&scene, baked, |radius, errors| switches(radius, errors, settings)),
-        costs: None,
-        batches: scene.folded.as_ref().map(record::batches),
-    };
-    let mut costs = record::costs(&scene.scene, &record.meshes, &scene.images);
-    let unknown_images = (0..).zip(&scene.images).filter(|(_, image)| 0 < image.bytes && image.size.is_none());
-    let unknown_images: Vec<String> = unknown_images.map(|(index, _): (usize, _)| format!("images[{index}]")).collect();
-    let embedded: u64 = scene.images.iter().map(|image| image.embedded).sum();
-    let target = target(root, &relative, settings.format);
-    let stem = target.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let container = match settings.format {
-        Format::Source => scene.scene.document.container,
-        Format::Glb => Container::Glb,
-        Format::Gltf => Container::Gltf,
-    };
-    let mut hashes: Vec<MeshHash> = scene.sub_meshes.iter().flatten().map(|sub| sub.hash).collect();
-    let mut known = BTreeSet::new();
-    hashes.retain(|hash| known.insert(*hash));
-    let ReadScene {
-        todo,
-        dependencies: scene_dependencies,
-        scene: Scene { document, buffers, dependencies, warnings, .. },
-        seen,
-        ..
-    } = scene;
-    let refused = |error: WriteError| Failure {
-        file: Box::new(todo.file.clone()),
-        cause: format!("failed to write levels into `{relative}`: {error}"),
-        hint: error.hint().map(str::to_owned),
-    };
-    let batches = instancing::batches(&document, &buffers).map_err(|error| refused(error.into()))?;
-    let mut package = Package::new(document, &buffers, dependencies.clone(), container).map_err(refused)?;
-    let added = add_levels(&mut package.document, &levels, &batches, settings).map_err(refused)?;
-    notes.extend(package.notes());
-    notes.extend(added.notes);
-    if added.groups == 0 {
-        record.status = Status::Copied;
-    }
-    let content = if added.groups == 0 && !package.is_converted() && !is_changed {
-        Content::AsSource { copied: dependencies }
-    } else {
-        Content::Files(package.finish(&stem, added.buffer, &buffers).map_err(refused)?)
-    };
-    let emission = Emission { source: &todo.file.path, target: &target, content: &content };
-    let emitted = output.emit(&emission).map_err(|error| Failure {
-        file: Box::new(todo.file.clone()),
-        cause: error.to_string(),
-        hint: error.hint().map(str::to_owned),
-    })?;
-    let mut problems: Vec<Problem> = warnings.iter().map(|w| record::warning(&relative, &w.place, &w.text)).collect();
-    problems.extend(notes.iter().map(|note| record::warning(&relative, &note.place, &note.text)));
-    if todo.settings.appearance.record {
-        problems.extend(unknown_images.iter().map(|place| {
-            record::warning(
-                &relative,
-                place,
-                "the image is neither PNG, JPEG, WebP nor KTX2; looks are measured without it",
-            )
-        }));
-    }
-    let missing =
-        |uri: &String| record::warning(&relative, "", &format!("`{uri}` is not there, nor beside the output"));
-    problems.extend(emitted.missing.iter().map(missing));
-    let outputs = outputs(&emitted, root).map_err(|error| Failure {
-        file: Box::new(todo.file.clone()),
-        cause: format!("failed to read back what was written: {error}"),
-        hint: None,
-    })?;
-    record.outputs = outputs
-        .iter()
-        .map(|o| OutputRecord { path: o.relative.clone(), bytes: o.seen.stat.size, hash: o.seen.content.to_string() })
-        .collect();
-    record.bytes_out = record.outputs.iter().filter(|o| is_geometry(&o.path)).map(|o| o.bytes).sum();
-    costs.geometry_bytes = record.bytes_out.saturating_sub(embedded);
-    record.costs = Some(costs);
-    let bake =
-        index::Bake { scene: seen, dependencies: scene_dependencies, meshes: hashes, outputs, facts: Vec::new() };
-    let new_files = emitted.files.iter().filter(|f| f.written).count() as u64;
-    Ok(Written { todo, facts: SceneFacts { record, problems }, bake, new_files })
-}
-
-/// What is there now, as the index keeps it. A file that two scenes copy is listed for both.
-fn outputs(emitted: &Emitted, root: &Path) -> std::io::Result<Vec<index::Output>> {
-    let output = |file: &EmittedFile| {
-        let below = file.path.strip_prefix(root).unwrap_or(&file.path);
-        let relative = below.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/");
-        Ok(index::Output { relative, seen: Seen::read(&file.path)? })
-    };
-    emitted.files.iter().map(output).collect()
-}
-
-/// Scenes and buffers, not images.
-fn is_geometry(path: &str) -> bool {
-    let path = Path::new(path);
-    path.extension().is_some_and(|e| ["glb", "gltf", "bin"].iter().any(|known| e.eq_ignore_ascii_case(known)))
-}
-
-/// One sub-mesh at one level, shared by the meshes that have it; empty if it stays as the source.
-type SharedPart = Vec<Arc<LevelPrimitive>>;
-
-/// A level primitive whose indices into the source's vertices are those of the source's accessors: where triangles use
-/// only a part of them, that part was read and simplified.
-fn in_source(source: &SourceMesh, index: usize, level: &Arc<LevelPrimitive>) -> Arc<LevelPrimitive> {
-    if matches!(level.vertices, LevelVertices::Own(_)) || !source.vertex_maps.contains_key(&index) {
-        return level.clone();
-    }
-    let indices = source.source_indices(index, &level.indices).into_owned();
-    Arc::new(LevelPrimitive { indices, vertices: LevelVertices::Source })
-}
-
-/// The levels of every mesh that has a chain, put together from its sub-meshes.
-fn levels(scene: &ReadScene, chains: &BTreeMap<JobKey, Arc<Chain>>) -> Vec<MeshLevels> {
-    let mut shared: BTreeMap<(JobKey, usize), Vec<SharedPart>> = BTreeMap::new();
-    let mut out = Vec::new();
-    for source in &scene.scene.meshes {
-        let MeshPlan::Chain { chain: key, .. } = &scene.plans[source.index] else { continue };
-        let chain = &chains[key];
-        let subs = &scene.sub_meshes[source.index];
-        let levels = chain.levels.iter().enumerate().map(|(number, level)| {
-            // Meshes with the same chain share its primitives, and so their bytes in the output.
-            let parts = shared.entry((*key, number)).or_insert_with(|| {
-                let arcs = |part: &Level| part.primitives.iter().map(|p| Arc::new(p.clone())).collect();
-                let part = |part: &Option<Level>| part.as_ref().map_or_else(Vec::new, arcs);
-                level.parts.iter().map(part).collect()
-            });
-            let mut primitives = vec![PrimitiveLevel::AsSource; source.primitives.len()];
-            for (sub, part) in subs.iter().zip(parts.iter()) {
-                for (&index, primitive) in sub.primitives.iter().zip(part) {
-                    primitives[index] = PrimitiveLevel::Level(in_source(source, index, primitive));
-                }
-            }
-            let facts = level.bound.map(|bound| serde_json::json!({ "bound": bound }));
-            MeshLevel { primitives, error: level.error, facts }
-        });
-        out.push(MeshLevels { mesh: source.index, radius: scene.radii[source.index], levels: levels.collect() });
-    }
-    out
 }

@@ -4,10 +4,10 @@
 //! unless names are but labels. Handles stay, and what hangs below one moves with it; all other nodes are transforms.
 
 use super::Instance;
+use crate::gltf::anchors::SourceGroups;
 use crate::gltf::document::Document;
 use crate::gltf::error::DocumentError;
 use crate::gltf::json;
-use crate::gltf::lod::SourceGroups;
 use crate::gltf::similarity;
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4};
 use serde_json::Value;

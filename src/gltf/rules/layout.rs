@@ -3,6 +3,7 @@
 use super::group::Group;
 use super::{Found, Rule, array, index};
 use crate::gltf::document::Document;
+use crate::gltf::library;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -20,10 +21,26 @@ struct Range {
 pub(super) fn check(source: &Document, output: &Document, groups: &[Group], found: &mut Found) {
     let ranges = ranges(source, output, found);
     let ranks = ranks(source, output, groups, found);
-    let mut sections: BTreeMap<usize, Vec<Range>> = BTreeMap::new();
+    // All levels in one buffer, but for those in files that scenes share: one for each mesh.
+    let is_shared = |buffer: usize| {
+        let address = array(output, "buffers").get(buffer).and_then(|b| b.get("uri")?.as_str());
+        address.is_some_and(|address| address.contains(library::FOLDER))
+    };
+    let mut sections: BTreeMap<Option<usize>, BTreeMap<usize, Vec<Range>>> = BTreeMap::new();
     for (view, rank) in ranks {
-        sections.entry(rank).or_default().extend(ranges.get(&view));
+        if let Some(range) = ranges.get(&view) {
+            let buffer = Some(range.buffer).filter(|&buffer| is_shared(buffer));
+            sections.entry(buffer).or_default().entry(rank).or_default().push(*range);
+        }
     }
+    for sections in sections.into_values() {
+        check_order(sections, found);
+    }
+    check_accessors(source, output, found);
+}
+
+/// Each section, by rank, behind the one before it.
+fn check_order(sections: BTreeMap<usize, Vec<Range>>, found: &mut Found) {
     let mut before: Option<Range> = None;
     for (rank, mut section) in sections {
         section.sort_by_key(|range| (range.buffer, range.start));
@@ -37,7 +54,6 @@ pub(super) fn check(source: &Document, output: &Document, groups: &[Group], foun
             before = Some(range);
         }
     }
-    check_accessors(source, output, found);
 }
 
 /// Appended buffer views, behind everything that the source has in the same buffer.

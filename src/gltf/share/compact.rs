@@ -18,7 +18,7 @@ const GRAIN: usize = 8;
 
 /// Drops what nothing needs. `touched` are views that lost a user, each with a view that can stand for it. Buffers that
 /// were files and have changed have no address afterwards.
-pub(super) fn compact(
+pub(in crate::gltf) fn compact(
     document: &mut Document,
     buffers: &Buffers,
     touched: &BTreeMap<usize, usize>,

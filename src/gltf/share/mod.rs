@@ -9,11 +9,12 @@
 //! r's accessors. No entry of any array goes or changes its index: a mesh, accessor or buffer view that lost its bytes
 //! stands for r's. Does not know how it was found out that two meshes are alike.
 
-mod compact;
+pub(super) mod compact;
 mod equal;
 #[cfg(test)]
 mod tests;
 
+use super::anchors::SourceGroups;
 use super::buffers::Buffers;
 use super::decode::draco;
 use super::document::Document;
@@ -21,7 +22,6 @@ use super::error::DocumentError;
 use super::follow::{self, Moved};
 use super::instancing::MOVE_WITH_MESH;
 use super::json;
-use super::lod::SourceGroups;
 use super::notes::Notes;
 use super::similarity::Similarity;
 use serde_json::{Map, Value, json};
@@ -318,7 +318,7 @@ impl Retired {
     }
 }
 
-fn index(value: &Value, key: &str) -> Option<usize> {
+pub(super) fn index(value: &Value, key: &str) -> Option<usize> {
     value.get(key).and_then(json::integer).map(|index| index as usize)
 }
 
@@ -345,6 +345,13 @@ fn used_accessors(document: &Document) -> Result<BTreeSet<usize>, DocumentError>
             used.extend(names(Some(object)).filter_map(|name| index(object, name)));
         }
     }
+    used.extend(accessors_beside_meshes(document)?);
+    Ok(used)
+}
+
+/// Accessors that anything but a mesh refers to.
+pub(super) fn accessors_beside_meshes(document: &Document) -> Result<BTreeSet<usize>, DocumentError> {
+    let mut used = BTreeSet::new();
     used.extend(document.array("skins")?.iter().filter_map(|skin| index(skin, "inverseBindMatrices")));
     for animation in document.array("animations")? {
         for sampler in animation.get("samplers").and_then(Value::as_array).into_iter().flatten() {
