@@ -11,7 +11,9 @@ use lodbake::gltf::read;
 use lodbake::gltf::scene::{Scene, SourceMesh, SourcePrimitive};
 use lodbake::gltf::share::{Copy, Sharing, share};
 use lodbake::gltf::similarity::{self, Similarity};
+use lodbake::gltf::split::{Repeated, Splitting, split};
 use lodbake::identify::alike::{Kind, Match, find};
+use lodbake::identify::parts::{self, Group, Search};
 use lodbake::identify::sub_meshes;
 use lodbake::mesh::{Attribute, Format, Primitive};
 use serde_json::Value;
@@ -292,20 +294,60 @@ fn nodes_draw_what_they_drew() {
         saved += bytes(&buffers) - bytes(&shared.buffers);
         let after = read::from_document(document, shared.buffers, path.parent().unwrap()).unwrap();
         let nodes = scene.document.array("nodes").unwrap().len();
-        let (before, after) = (drawn(&scene, nodes), drawn(&after, nodes));
-        assert_eq!(before.keys().collect::<Vec<_>>(), after.keys().collect::<Vec<_>>(), "{}", path.display());
-        for (node, points) in &before {
-            let (others, radius) = (&after[node], ball(points).1);
-            assert_eq!(points.len(), others.len(), "{}: node {node}", path.display());
-            let off = farthest(points.iter().copied(), others, 20, points.len());
-            let back = farthest(others.iter().copied(), points, 20, points.len());
-            assert!(off.max(back) <= 2.0 * TOLERANCE * radius, "{}: node {node} is off by {off:e}", path.display());
-        }
+        same_points(&path, &drawn(&scene, nodes), &drawn(&after, nodes));
         files += 1;
         instances += copies.len();
     }
     println!("{instances} instances in {files} files, {saved} bytes saved");
     assert!(0 < instances);
+}
+
+/// Parts are taken out wherever that saves any byte: what nodes draw is the same.
+#[test]
+fn parts_are_drawn_where_they_were() {
+    let Some(corpus) = corpus() else { return };
+    let (mut files, mut parts) = (0, 0);
+    for path in scenes(&corpus) {
+        let Ok(scene) = read::read(&path) else { continue };
+        let splitting = Splitting::new(&scene.document, true).unwrap();
+        let search = Search {
+            tolerance: TOLERANCE,
+            most: Kind::Mirrored,
+            looks: &|mesh, primitive| splitting.looks(mesh, primitive),
+            shown: &|mesh| splitting.shown(mesh),
+            node_bytes: 1,
+        };
+        let groups = parts::find(&scene.meshes, &search).groups;
+        if groups.is_empty() {
+            continue;
+        }
+        let repeated = |group: &Group| {
+            let occurrences = group.occurrences.iter().map(|o| (o.part.clone(), o.by)).collect();
+            Repeated { of: group.of.clone(), mesh: group.mesh, occurrences }
+        };
+        let repeated: Vec<Repeated> = groups.iter().map(repeated).collect();
+        let Scene { mut document, buffers, .. } = read::read(&path).unwrap();
+        let done = split(&mut document, &buffers, &repeated).unwrap();
+        same_names(&scene.document, &document);
+        let after = read::from_document(document, done.buffers, path.parent().unwrap()).unwrap();
+        let nodes = scene.document.array("nodes").unwrap().len();
+        same_points(&path, &drawn(&scene, nodes), &drawn(&after, nodes));
+        files += 1;
+        parts += groups.iter().map(|group| group.occurrences.len()).sum::<usize>();
+    }
+    println!("{parts} parts in {files} files");
+    assert!(0 < parts);
+}
+
+fn same_points(path: &Path, before: &BTreeMap<usize, Vec<DVec3>>, after: &BTreeMap<usize, Vec<DVec3>>) {
+    assert_eq!(before.keys().collect::<Vec<_>>(), after.keys().collect::<Vec<_>>(), "{}", path.display());
+    for (node, points) in before {
+        let (others, radius) = (&after[node], ball(points).1);
+        assert_eq!(points.len(), others.len(), "{}: node {node}", path.display());
+        let off = farthest(points.iter().copied(), others, 20, points.len());
+        let back = farthest(others.iter().copied(), points, 20, points.len());
+        assert!(off.max(back) <= 2.0 * TOLERANCE * radius, "{}: node {node} is off by {off:e}", path.display());
+    }
 }
 
 /// Entries keep their places.

@@ -56,6 +56,7 @@ pub(crate) fn scene(path: &str) -> SceneRecord {
             images: vec![image("wood", 4_000, 512), image("paint", 1_000, 2048)],
         }),
         batches: None,
+        parts: None,
     }
 }
 

@@ -216,6 +216,12 @@ pub(super) struct InstancesTable {
     #[schemars(range(max = 0.01), extend("exclusiveMinimum" = 0, "default" = defaults::TOLERANCE))]
     pub tolerance: Option<f64>,
 
+    /// Connected parts that occur more than once in meshes become instances, too: a bolt that was merged into a machine 200 times.
+    /// Only where `recover` is at least "rigid", and where the bytes that go are more than those of the nodes that come.
+    /// Default: false.
+    #[schemars(extend("default" = false))]
+    pub split: Option<bool>,
+
     /// How nodes that show the same mesh are written. Default: nodes.
     #[schemars(extend("default" = Instancing::default()))]
     pub instancing: Option<Instancing>,

@@ -4,7 +4,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use super::check::Document;
-use super::choice::{ErrorUnit, Layout, Placement, Storage};
+use super::choice::{ErrorUnit, Layout, Placement, Recover, Storage};
 use super::error::{ConfigError, Place};
 use super::file::{
     AppearanceTable, InstancesTable, LodEntry, OneOrMany, OverrideEntry, PipelineFile, ScreenTable, SimplifyTable,
@@ -45,7 +45,7 @@ impl Layer {
         lay!(over.simplify, self.simplify; metric, effort, normal, texcoord, color, border, seam, crease);
         lay!(over.simplify, self.simplify; placement, min_triangles, lock_border, candidates);
         lay!(over.appearance, self.appearance; record, size);
-        lay!(over.instances, self.instances; recover, tolerance, instancing, cell, names, required);
+        lay!(over.instances, self.instances; recover, tolerance, split, instancing, cell, names, required);
     }
 
     /// Fills what is still absent with defaults.
@@ -80,6 +80,8 @@ impl Layer {
             instances: InstanceSettings {
                 recover: self.instances.recover.unwrap_or_default(),
                 tolerance: self.instances.tolerance.unwrap_or(defaults::TOLERANCE),
+                // An override that recovers nothing takes nothing apart.
+                split: self.instances.split.unwrap_or(false) && self.moves_instances(),
                 instancing: self.instances.instancing.unwrap_or_default(),
                 cell: self.instances.cell.unwrap_or(defaults::CELL),
                 names: self.instances.names.unwrap_or_default(),
@@ -91,6 +93,11 @@ impl Layer {
             settings.appearance.size = defaults::DECIDING_LOOK_SIZE;
         }
         settings
+    }
+
+    /// May instances be moved?
+    fn moves_instances(&self) -> bool {
+        Recover::Rigid <= self.instances.recover.unwrap_or_default()
     }
 
     fn simplify_settings(&self, storage: Storage) -> SimplifySettings {
@@ -148,9 +155,15 @@ pub(super) fn pipeline(document: &Document<'_>, file: &str) -> Result<Pipeline, 
         lod: typed.lod,
     };
     check_layer(document, &top, &layer)?;
+    check_split(document, &top, &layer, &layer)?;
     let mut overrides = Vec::new();
     for (i, entry) in typed.overrides.unwrap_or_default().into_iter().enumerate() {
-        overrides.push(override_layer(document, &top.key("override").index(i), entry)?);
+        let place = top.key("override").index(i);
+        let (globs, over) = override_layer(document, &place, entry)?;
+        let mut laid = layer.clone();
+        laid.lay(&over);
+        check_split(document, &place, &over, &laid)?;
+        overrides.push((globs, over));
     }
     let mut budgets = Vec::new();
     for (i, entry) in typed.budget.unwrap_or_default().into_iter().enumerate() {
@@ -236,6 +249,15 @@ fn check_layer(document: &Document<'_>, place: &Place, layer: &Layer) -> Result<
     if given != 0 && given != entries.len() {
         let cause = format!("has `coverage` for {given} of {} levels: give it for all or for none", entries.len());
         return Err(document.invalid(&place, cause));
+    }
+    Ok(())
+}
+
+/// Parts of one mesh are never at the same place: what asks for them has to ask for instances that are moved.
+fn check_split(document: &Document<'_>, place: &Place, layer: &Layer, laid: &Layer) -> Result<(), ConfigError> {
+    if layer.instances.split == Some(true) && !laid.moves_instances() {
+        let place = place.key("instances").key("split");
+        return Err(document.invalid(&place, "needs `recover` to be \"rigid\", \"similar\" or \"mirrored\""));
     }
     Ok(())
 }

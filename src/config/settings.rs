@@ -39,6 +39,8 @@ pub struct InstanceSettings {
     /// What may be left between a mesh and the one rebuilt from the first: of positions as a fraction of the radius, of
     /// normals and tangents between unit vectors; more than 0.
     pub tolerance: f64,
+    /// Connected parts of meshes that occur more than once become instances, too; never set without `recover`.
+    pub split: bool,
     /// How instances are written.
     pub instancing: Instancing,
     /// Radius of a batch at most, in radii of its largest instance; more than 0.
@@ -54,6 +56,7 @@ impl Default for InstanceSettings {
         Self {
             recover: Recover::None,
             tolerance: defaults::TOLERANCE,
+            split: false,
             instancing: Instancing::Nodes,
             cell: defaults::CELL,
             names: NodeNames::Keep,

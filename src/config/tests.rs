@@ -91,6 +91,13 @@ fn ranges_are_stated() {
     insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\ncoverage = 1.01"), @"`project/pipeline.toml` line 5: lod[0].coverage 1.01 is out of range: must be more than 0 and at most 1");
     insta::assert_snapshot!(refused("[instances]\ncell = 0"), @"`project/pipeline.toml` line 4: instances.cell 0 is out of range: must be more than 0");
     insta::assert_snapshot!(refused("[instances]\ntolerance = 0"), @"`project/pipeline.toml` line 4: instances.tolerance 0 is out of range: must be more than 0 and at most 0.01");
+    let words = "needs `recover` to be \"rigid\", \"similar\" or \"mirrored\"";
+    for recover in ["", "recover = 'none'", "recover = 'exact'"] {
+        let refused = refused(&format!("[instances]\nsplit = true\n{recover}"));
+        assert_eq!(refused, format!("`project/pipeline.toml` line 4: instances.split {words}"));
+    }
+    let refused_over = refused("[[override]]\nmatch = '*'\ninstances = { split = true }");
+    assert_eq!(refused_over, format!("`project/pipeline.toml` line 5: override[0].instances.split {words}"));
     insta::assert_snapshot!(refused("[simplify]\nnormal = -0.1"), @"`project/pipeline.toml` line 4: simplify.normal -0.1 is out of range: must be 0 or more");
     insta::assert_snapshot!(refused("[simplify]\nnormal = nan"), @"`project/pipeline.toml` line 4: simplify.normal nan is out of range: must be finite, and 0 or more");
     insta::assert_snapshot!(refused("[simplify]\nborder = inf"), @"`project/pipeline.toml` line 4: simplify.border inf is out of range: must be finite, and 0 or more");

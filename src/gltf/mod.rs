@@ -3,7 +3,8 @@
 //! `document` holds a file without loss; `buffers`, `accessor` and `decode` turn its bytes into numbers; `read` puts
 //! a whole scene together. `lod` appends levels to a document (`write` the binary data, `level_mesh` the meshes,
 //! `follow` whoever pointed at them), `package` makes files of it, and `rules` checks them.
-//! `library` keeps geometry in files that scenes share. `share` writes instances that were found, `fold` makes batches of nodes that show the same mesh.
+//! `library` keeps geometry in files that scenes share. `share` writes instances that were found, `split` takes repeated parts out of
+//! meshes, `fold` makes batches of nodes that show the same mesh.
 
 pub mod accessor;
 mod anchors;
@@ -33,6 +34,7 @@ pub mod rules;
 pub mod scene;
 pub mod share;
 pub mod similarity;
+pub mod split;
 pub mod structure;
 pub mod triangles;
 pub mod uri;

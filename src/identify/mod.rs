@@ -7,6 +7,7 @@ pub mod alike;
 pub mod borders;
 pub mod instances;
 pub mod inventory;
+pub mod parts;
 
 use crate::gltf::document::{Document, DocumentError};
 use crate::gltf::json;

@@ -133,7 +133,7 @@ pub fn write_chain(settings: &ChainSettings, to: &mut dyn ManifestWriter) {
 }
 
 fn write_instances(settings: &InstanceSettings, to: &mut dyn ManifestWriter) {
-    let InstanceSettings { recover, tolerance, instancing, cell, names, required } = *settings;
+    let InstanceSettings { recover, tolerance, split, instancing, cell, names, required } = *settings;
     if recover == Recover::None && instancing == Instancing::Nodes {
         return;
     }
@@ -142,6 +142,9 @@ fn write_instances(settings: &InstanceSettings, to: &mut dyn ManifestWriter) {
             to.text("recover", recover.name());
         }
         to.number("tolerance", tolerance);
+        if split {
+            to.flag("split", split);
+        }
         if instancing == Instancing::Gpu {
             to.text("instancing", instancing.name());
             to.number("cell", cell);

@@ -41,7 +41,7 @@ const LEVELS: &[&str] = &["chain", "scene"];
 const SCENE: &[&str] = &["scene"];
 
 /// Every setting of a scene, another value for it, and the keys that it must change.
-const CASES: [(&str, &[&str], &str); 28] = [
+const CASES: [(&str, &[&str], &str); 29] = [
     (
         "simplify.metric = 'qem'",
         ALL,
@@ -91,6 +91,11 @@ const CASES: [(&str, &[&str], &str); 28] = [
         "instances = { recover = 'similar', tolerance = 1e-4 }",
         SCENE,
         "instances.recover: (none) -> similar; instances.tolerance: (none) -> 0.0001",
+    ),
+    (
+        "instances = { recover = 'rigid', split = true }",
+        SCENE,
+        "instances.recover: (none) -> rigid; instances.tolerance: (none) -> 1e-5; instances.split: (none) -> true",
     ),
     (
         "instances = { instancing = 'gpu', cell = 20, names = 'drop', required = false }",

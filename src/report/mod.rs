@@ -117,6 +117,45 @@ pub struct SceneRecord {
     /// Nodes that became batches of instances. Absent where that is not asked for.
     #[serde(default)]
     pub batches: Option<BatchesRecord>,
+    /// Parts that occur more than once and were taken out of meshes. Absent where that is not asked for.
+    #[serde(default)]
+    pub parts: Option<PartsRecord>,
+}
+
+/// Connected parts of meshes that occur more than once in the file, and became instances.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PartsRecord {
+    /// Each of them, once.
+    pub groups: Vec<PartRecord>,
+    /// Nodes added for them.
+    pub nodes: u64,
+    /// Bytes of all buffers before they were taken out, and after.
+    pub bytes_before: u64,
+    /// See `bytes_before`.
+    pub bytes_after: u64,
+    /// How many other parts stay where they are, although enough of them have equally many triangles, by the reason.
+    pub stayed: BTreeMap<String, u64>,
+}
+
+/// A connected part that occurs more than once.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PartRecord {
+    /// Index of the mesh that shows it: behind those of the source, or one of the source that is left with this part alone.
+    pub mesh: u64,
+    /// Its triangles.
+    pub triangles: u64,
+    /// How often it was taken out of meshes.
+    pub instances: u64,
+    /// Indices of these meshes.
+    pub meshes: Vec<u64>,
+    /// What it takes to make them of the one that is left, and how often.
+    pub kinds: BTreeMap<Kind, u64>,
+    /// The largest difference that is left, positions as a fraction of the radius of the part.
+    pub residual: Residual,
+    /// Nodes that show it: for each instance one below every node that shows its mesh.
+    pub nodes: u64,
+    /// Bytes of one: vertices and indices.
+    pub bytes: u64,
 }
 
 /// Nodes that show the same mesh, written as batches of `EXT_mesh_gpu_instancing`.

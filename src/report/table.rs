@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
-use super::{BatchesRecord, LevelRecord, MeshRecord, Report, Stop};
+use super::{BatchesRecord, LevelRecord, MeshRecord, PartsRecord, Report, Stop};
 use crate::config::{ErrorUnit, LevelTarget};
 use crate::progress::Summary;
 use crate::progress::quantity::{bytes, count, duration, plural};
@@ -74,6 +74,7 @@ fn figures(report: &Report, summary: &Summary, wall: Duration) -> String {
         let (found, recovered) = (count(totals.instances_found), count(totals.instances_recovered));
         rows.push(vec!["instances".to_owned(), format!("{recovered} recovered of {found} found{residual}")]);
     }
+    rows.extend(parts(report));
     rows.extend(batches(report));
     let looks = Duration::from_millis(summary.looks_milliseconds);
     if !looks.is_zero() && looks <= wall {
@@ -89,24 +90,48 @@ fn figures(report: &Report, summary: &Summary, wall: Duration) -> String {
     columns(&[], rows, &[])
 }
 
+/// `200 (2 different) on 400 nodes; residual up to 1.2e-7`; of those that stay most with the reason.
+fn parts(report: &Report) -> Vec<Vec<String>> {
+    let scenes: Vec<&PartsRecord> = report.scenes.iter().filter_map(|scene| scene.parts.as_ref()).collect();
+    if scenes.is_empty() {
+        return Vec::new();
+    }
+    let groups = || scenes.iter().flat_map(|scene| &scene.groups);
+    let instances: u64 = groups().map(|group| group.instances).sum();
+    let nodes = plural(scenes.iter().map(|scene| scene.nodes).sum(), "node");
+    let worst = groups().map(|group| group.residual.worst()).fold(0.0, f64::max);
+    let different = count(groups().count() as u64);
+    let words = match instances {
+        0 => count(0),
+        _ => format!("{} ({different} different) on {nodes}; residual up to {worst:.1e}", count(instances)),
+    };
+    let mut rows = vec![vec!["parts".to_owned(), words]];
+    rows.extend(stays("stay parts", scenes.iter().map(|scene| &scene.stayed)));
+    rows
+}
+
+/// `40; 30 of them: too few with their mesh are near them`.
+fn stays<'r>(name: &str, all: impl Iterator<Item = &'r BTreeMap<String, u64>>) -> Option<Vec<String>> {
+    let mut stayed: BTreeMap<&str, u64> = BTreeMap::new();
+    for (why, number) in all.flatten() {
+        *stayed.entry(why).or_insert(0) += number;
+    }
+    let (why, most) = stayed.iter().rev().max_by_key(|(_, most)| **most)?;
+    let all = count(stayed.values().sum());
+    let words = if stayed.len() == 1 { all } else { format!("{all}; {} of them", count(*most)) };
+    Some(vec![name.to_owned(), format!("{words}: {why}")])
+}
+
 /// `1,296 nodes in 12 batches`; `40`, most of them with the reason why they are no part of any.
 fn batches(report: &Report) -> Vec<Vec<String>> {
     let scenes: Vec<&BatchesRecord> = report.scenes.iter().filter_map(|scene| scene.batches.as_ref()).collect();
     if scenes.is_empty() {
         return Vec::new();
     }
-    let mut stayed: BTreeMap<&str, u64> = BTreeMap::new();
-    for (why, number) in scenes.iter().flat_map(|scene| &scene.stayed) {
-        *stayed.entry(why).or_insert(0) += number;
-    }
     let (nodes, batches) = scenes.iter().fold((0, 0), |sums, s| (sums.0 + s.instances, sums.1 + s.batches));
     let batches = if batches == 1 { "1 batch".to_owned() } else { format!("{} batches", count(batches)) };
     let mut rows = vec![vec!["batches".to_owned(), format!("{} in {batches}", plural(nodes, "node"))]];
-    if let Some((why, most)) = stayed.iter().rev().max_by_key(|(_, most)| **most) {
-        let all = count(stayed.values().sum());
-        let words = if stayed.len() == 1 { all } else { format!("{all}; {} of them", count(*most)) };
-        rows.push(vec!["stay nodes".to_owned(), format!("{words}: {why}")]);
-    }
+    rows.extend(stays("stay nodes", scenes.iter().map(|scene| &scene.stayed)));
     rows
 }
 

@@ -65,6 +65,7 @@ fn scene(path: &str, status: Status, meshes: Vec<MeshRecord>) -> SceneRecord {
         meshes,
         costs: None,
         batches: None,
+        parts: None,
     }
 }
 

@@ -5,7 +5,10 @@ No tool simplifies here: lodbake bakes without levels (`min_triangles` above all
 `instance`, gltfpack `-mi -noq -km` (no quantisation, materials kept; keeping names would turn `-mi` off). Images are not counted. "draws" are the
 nodes with a mesh, with all instances: they must stay as many.
 
-    instances.py [--lodbake PATH] [--tools FOLDER_WITH_NODE_MODULES] [--recover KIND] FOLDER_OR_FILE..
+With `--split` lodbake alone runs, first without and then with `split = true`, as nodes and as batches; scenes without such parts are
+left out.
+
+    instances.py [--lodbake PATH] [--tools FOLDER_WITH_NODE_MODULES] [--recover KIND] [--split] FOLDER_OR_FILE..
 """
 
 import argparse
@@ -74,11 +77,11 @@ def by_other(tool, program, source, work):
     return out
 
 
-def lodbake(program, source, work, recover):
+def lodbake(program, source, work, recover, more=""):
     pipeline = work / "pipeline.toml"
     pipeline.write_text(
         f'input = "{source.parent}"\noutput = "out"\ninclude = "{source.name}"\n[simplify]\nmin_triangles = 4294967295\n'
-        f'[appearance]\nrecord = false\n[instances]\nrecover = "{recover}"\n'
+        f'[appearance]\nrecord = false\n[instances]\nrecover = "{recover}"\n{more}\n'
     )
     began = time.perf_counter()
     run([program, "--no-cache", "--quiet", pipeline])
@@ -93,17 +96,43 @@ def lodbake(program, source, work, recover):
     return work / "out" / source.name, kinds, residual, seconds
 
 
+def parts(options, files):
+    print("| scene | parts, different | nodes | residual | bytes without | nodes | batches | s without | s with |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for source in files:
+        with tempfile.TemporaryDirectory() as name:
+            work = Path(name)
+            sizes, times, record = [], [], None
+            for more in ("", "split = true", 'split = true\ninstancing = "gpu"'):
+                baked, _, _, seconds = lodbake(options.lodbake.resolve(), source, work, options.recover, more)
+                sizes.append(f"{load(baked)[1]:,}")
+                times.append(f"{seconds:.2f}")
+                found = json.loads((work / "out/report.json").read_text())["scenes"][0]["parts"]
+                record = record or found
+            if not record["groups"]:
+                continue
+            groups = record["groups"]
+            residual = max(max(group["residual"].values()) for group in groups)
+            count = sum(group["instances"] for group in groups)
+            row = [source.name, f"{count}, {len(groups)}", str(record["nodes"]), f"{residual:.1e}", *sizes, *times[:2]]
+            print("| " + " | ".join(row) + " |", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--lodbake", type=Path, default=ROOT / "target/release/lodbake")
     parser.add_argument("--tools", type=Path, help="a folder whose node_modules has gltf-transform and gltfpack")
     parser.add_argument("--recover", default="similar")
+    parser.add_argument("--split", action="store_true")
     parser.add_argument("scenes", type=Path, nargs="+")
     options = parser.parse_args()
     files = []
     for path in options.scenes:
         found = [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.suffix in (".glb", ".gltf"))
         files += [p.resolve() for p in found]
+    if options.split:
+        parts(options, files)
+        return
     tools = options.tools and options.tools.resolve() / "node_modules/.bin"
     print("| scene | source: geometries, draws, bytes | lodbake | found | residual | s | glTF-Transform | gltfpack |")
     print("|---|---|---|---|---|---|---|---|")

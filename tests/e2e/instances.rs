@@ -158,6 +158,72 @@ fn batches_switch_levels_as_one_and_the_report_tells_what_is_none() {
     assert_eq!(space.json("out/field.gltf").get("extensionsRequired"), None);
 }
 
+/// A plate with 24 studs and one that is dented, all one mesh, on two nodes.
+fn machine() -> Scene {
+    let mut shape = Shape::grid(8, 0.0).moved(30.0, 0, [-4.0, -4.0, -1.0]);
+    for i in 0..25u8 {
+        let (x, y) = (f32::from(i % 5) * 4.0, f32::from(i / 5) * 4.0);
+        let mut stud = Shape::sphere(8, 10).moved(1.0, usize::from(i), [x, y, 0.0]);
+        if i == 12 {
+            stud = stud.dented(7, 1e-3);
+        }
+        shape = shape.with(&stud);
+    }
+    let mut scene = Scene::new();
+    let mesh = scene.mesh("machine", &shape);
+    scene.node("left", mesh, [0.0; 3]);
+    scene.node("right", mesh, [40.0, 0.0, 5.0]);
+    scene
+}
+
+#[test]
+fn parts_of_one_mesh_become_instances() {
+    let settings = |more: &str| {
+        format!("input = 'scenes'\noutput = 'out'\n[instances]\nrecover = 'rigid'\n{more}\n[[lod]]\nratio = 0.5\n")
+    };
+    let spaces: Vec<Space> = ["", "split = true", "split = true\ninstancing = 'gpu'"]
+        .iter()
+        .map(|more| {
+            let space = Space::new();
+            space.write("pipeline.toml", settings(more));
+            space.write("scenes/machine.glb", machine().glb());
+            space.write("scenes/machine.gltf", machine().gltf());
+            let told = space.run_fine(&["pipeline.toml", "--jobs", "3"]);
+            assert_eq!(told.stderr.contains("48 (2 different) on 96 nodes"), !more.is_empty(), "{}", told.stderr);
+            assert!(space.run_fine(&["pipeline.toml"]).stderr.contains("no work"));
+            let (source, out) = ("scenes/machine.glb", "out/machine.glb");
+            let told = space.run_fine(&["--json", "evaluate", "--size", "96", "--samples", "100", source, out]);
+            let d_rms = &told.document()["candidates"][0]["d_rms"];
+            assert!(d_rms.as_f64().unwrap() < 0.05, "{more}: {d_rms}");
+            space
+        })
+        .collect();
+    let [whole, nodes, gpu] = &spaces[..] else { panic!("three") };
+    assert!(length(nodes, "out/machine.glb") < length(whole, "out/machine.glb"));
+    assert!(length(gpu, "out/machine.glb") < length(nodes, "out/machine.glb"));
+    let document = nodes.json("out/machine.gltf");
+    assert_eq!(document["nodes"][0]["children"].as_array().unwrap().len(), 1 + 24, "its levels and the studs");
+    assert_eq!(document["meshes"][1]["name"], "machine_part_0_128");
+    let record = nodes.json("out/report.json")["scenes"][0].clone();
+    let part = &record["parts"]["groups"][0];
+    assert_eq!((&part["mesh"], &part["instances"], &part["nodes"]), (&json!(1), &json!(24), &json!(48)));
+    assert_eq!(part["kinds"]["rigid"], 23);
+    assert!(part["residual"]["position"].as_f64().unwrap() < 1e-5);
+    assert!(record["parts"]["bytes_after"].as_u64().unwrap() * 3 < record["parts"]["bytes_before"].as_u64().unwrap());
+    let drawn = |space: &Space| space.json("out/report.json")["totals"]["triangles_drawn"][0].clone();
+    assert_eq!((drawn(whole), drawn(whole)), (drawn(nodes), drawn(gpu)));
+    // Two nodes with 24 studs each.
+    let record = gpu.json("out/report.json")["scenes"][0].clone();
+    assert_eq!((&record["batches"]["batches"], &record["batches"]["instances"]), (&json!(2), &json!(48)));
+    let one = Space::new();
+    one.write("pipeline.toml", settings("split = true"));
+    for name in ["machine.glb", "machine.gltf"] {
+        one.write(&format!("scenes/{name}"), nodes.read(&format!("scenes/{name}")));
+    }
+    one.run_fine(&["pipeline.toml", "--jobs", "1"]);
+    assert_eq!(one.files("out"), nodes.files("out"));
+}
+
 #[test]
 fn the_same_bytes_with_any_number_of_threads_and_nothing_to_do_after_it() {
     let (one, many) = (space(RECOVER), space(RECOVER));

@@ -69,6 +69,38 @@ impl Shape {
         self
     }
 
+    /// The same shape in another size, turned round the z axis by quarters, and moved.
+    pub fn moved(mut self, scale: f32, quarters: usize, by: [f32; 3]) -> Self {
+        let turn = |mut v: [f32; 3]| {
+            for _ in 0..quarters {
+                v = [-v[1], v[0], v[2]];
+            }
+            v
+        };
+        for (position, normal) in self.positions.iter_mut().zip(&mut self.normals) {
+            let turned = turn(*position);
+            *position = [0, 1, 2].map(|k| turned[k] * scale + by[k]);
+            *normal = turn(*normal);
+        }
+        self
+    }
+
+    /// One vertex is somewhere else.
+    pub fn dented(mut self, vertex: usize, by: f32) -> Self {
+        self.positions[vertex][2] += by;
+        self
+    }
+
+    /// Both in one mesh, side by side.
+    pub fn with(mut self, other: &Self) -> Self {
+        let first = self.positions.len() as u16;
+        self.positions.extend(&other.positions);
+        self.normals.extend(&other.normals);
+        self.texcoords.extend(&other.texcoords);
+        self.indices.extend(other.indices.iter().map(|i| first + i));
+        self
+    }
+
     /// Number of triangles.
     pub fn triangles(&self) -> usize {
         self.indices.len() / 3

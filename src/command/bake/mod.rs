@@ -8,6 +8,7 @@
 //! their number. One bad scene does not stop the others.
 
 pub(super) mod record;
+mod parts;
 mod recover;
 mod survey;
 mod sweep;

@@ -31,7 +31,7 @@ pub struct SceneFacts {
 }
 
 /// First byte of remembered facts; another one means another shape of [`SceneFacts`].
-const VERSION: u8 = 7;
+const VERSION: u8 = 8;
 
 /// For the index.
 pub fn to_bytes(facts: &SceneFacts) -> Vec<u8> {
@@ -59,6 +59,7 @@ impl SceneFacts {
             meshes: Vec::new(),
             costs: None,
             batches: None,
+            parts: None,
         };
         Self { record, problems }
     }

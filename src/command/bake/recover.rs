@@ -6,6 +6,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use super::parts::take_apart;
 use crate::config::{InstanceSettings, Instancing, Recover};
 use crate::gltf::dependencies::dependencies;
 use crate::gltf::document::DocumentError;
@@ -16,6 +17,7 @@ use crate::gltf::share::{Copy, Note, Sharing, share};
 use crate::identify::alike::{Kind, Match, find};
 use crate::identify::{SubMesh, sub_meshes};
 use crate::mesh::layout::frame;
+use crate::report::PartsRecord;
 
 /// A mesh that is another one, moved.
 #[derive(Clone, Debug)]
@@ -34,6 +36,8 @@ pub struct Recovered {
     pub sub_meshes: Vec<Vec<SubMesh>>,
     /// By mesh.
     pub instances: BTreeMap<usize, Instance>,
+    /// Parts that were taken out of meshes, where that is asked for.
+    pub parts: Option<PartsRecord>,
     /// Nodes that became batches, where that is asked for.
     pub folded: Option<Folded>,
     /// Something was changed.
@@ -44,7 +48,10 @@ pub struct Recovered {
 
 /// Finds instances and declares those that the settings ask for. `base` is the scene's folder.
 pub fn recover(scene: Scene, settings: &InstanceSettings, base: &Path) -> Result<Recovered, DocumentError> {
-    let mut out = declare(scene, settings, base)?;
+    let mut out = declare(scene, settings, base, usize::MAX)?;
+    if settings.split {
+        out = take_apart(out, settings, base)?;
+    }
     if settings.instancing == Instancing::Gpu {
         let spheres: Vec<Option<Sphere>> = out.scene.meshes.iter().map(sphere).collect();
         let folded = fold(&mut out.scene.document, &mut out.scene.buffers, &spheres, settings)?;
@@ -63,10 +70,17 @@ fn sphere(mesh: &SourceMesh) -> Option<Sphere> {
     (0 < mesh.triangles()).then(|| (middle.into(), radius))
 }
 
-fn declare(scene: Scene, settings: &InstanceSettings, base: &Path) -> Result<Recovered, DocumentError> {
+/// Declares instances among the first `count` meshes.
+pub(super) fn declare(
+    scene: Scene,
+    settings: &InstanceSettings,
+    base: &Path,
+    count: usize,
+) -> Result<Recovered, DocumentError> {
     let subs: Vec<Vec<SubMesh>> = scene.meshes.par_iter().map(sub_meshes).collect();
     let instances = BTreeMap::new();
-    let mut out = Recovered { scene, sub_meshes: subs, instances, folded: None, is_changed: false, notes: Vec::new() };
+    let (parts, folded, notes) = (None, None, Vec::new());
+    let mut out = Recovered { scene, sub_meshes: subs, instances, parts, folded, is_changed: false, notes };
     if settings.recover == Recover::None {
         return Ok(out);
     }
@@ -76,7 +90,8 @@ fn declare(scene: Scene, settings: &InstanceSettings, base: &Path) -> Result<Rec
         return Ok(out);
     }
     let sharing = Sharing::new(&out.scene.document)?;
-    let found = find(&out.scene.meshes, &out.sub_meshes, settings.tolerance, &|mesh| sharing.is_eligible(mesh));
+    let is_eligible = |mesh| mesh < count && sharing.is_eligible(mesh);
+    let found = find(&out.scene.meshes, &out.sub_meshes, settings.tolerance, &is_eligible);
     let mut copies = Vec::new();
     for found in found {
         let copy = Copy { mesh: found.mesh, of: found.of, by: found.by };

@@ -31,7 +31,7 @@ use crate::mesh::layout::frame;
 use crate::obj::{self, is_obj};
 use crate::plan::{MeshLook, MeshPlan, Plan};
 use crate::progress::Event;
-use crate::report::{Problem, Severity, Status};
+use crate::report::{PartsRecord, Problem, Severity, Status};
 use crate::scan::SceneFile;
 use crate::work::work;
 
@@ -64,6 +64,8 @@ pub struct ReadScene {
     pub instances: BTreeMap<usize, Instance>,
     /// Nodes that became batches.
     pub folded: Option<Folded>,
+    /// Parts that were taken out of meshes, where that is asked for.
+    pub parts: Option<PartsRecord>,
     /// Some of these are declared now: the document is not the source's.
     pub is_changed: bool,
     /// Of the search for them.
@@ -295,12 +297,13 @@ fn read_scene(todo: Todo) -> Result<ReadScene, Failure> {
         .filter_map(|d| beside.iter().find(|(path, _)| *path == d.path)?.1.seen.as_ref())
         .map(|seen| seen.stat.size)
         .sum();
-    let Recovered { scene, sub_meshes, instances, folded, is_changed, notes } =
+    let Recovered { scene, sub_meshes, instances, parts, folded, is_changed, notes } =
         recover(scene, &todo.settings.instances, base).map_err(refused)?;
     let uses = mesh_uses(&scene.document).map_err(refused)?;
     Ok(ReadScene {
         instances,
         folded,
+        parts,
         is_changed,
         notes,
         looks: mesh_looks(&scene, &sub_meshes, &beside, &todo),

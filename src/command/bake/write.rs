@@ -71,6 +71,7 @@ pub fn write_scene(scene: ReadScene, baked: &Baked, output: &OutputFolder, root:
         meshes: record::meshes(&scene, baked, |radius, errors| switches(radius, errors, settings)),
         costs: None,
         batches: scene.folded.as_ref().map(record::batches),
+        parts: scene.parts.clone(),
     };
     let mut costs = record::costs(&scene.scene, &record.meshes, &scene.images);
     let unknown_images = (0..).zip(&scene.images).filter(|(_, image)| 0 < image.bytes && image.size.is_none());

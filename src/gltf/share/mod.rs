@@ -64,7 +64,7 @@ const KNOWN: [&str; 16] = [
 const KNOWN_ON_NODES: [&str; 3] = ["KHR_lights_", "KHR_node_", "KHR_xmp_json_ld"];
 
 /// The extension of a primitive that lists materials.
-const VARIANTS: &str = "KHR_materials_variants";
+pub(super) const VARIANTS: &str = "KHR_materials_variants";
 
 /// What may be shared in a document.
 pub struct Sharing<'d> {
@@ -106,18 +106,26 @@ impl<'d> Sharing<'d> {
         self.eligible.get(mesh).copied().unwrap_or(false)
     }
 
+    /// Nodes that show a mesh.
+    pub fn nodes(&self, mesh: usize) -> &[usize] {
+        self.nodes.get(mesh).map_or(&[], Vec::as_slice)
+    }
+
     /// Why a copy cannot be written as an instance.
     pub fn obstacle(&self, copy: &Copy) -> Option<&'static str> {
-        if copy.by == Similarity::IDENTITY {
-            return None;
-        }
-        let mesh = &self.document.array("meshes").ok()?[copy.mesh];
+        if copy.by == Similarity::IDENTITY { None } else { self.fixed(copy.mesh) }
+    }
+
+    /// Why a mesh cannot be shown by a node of its own below those that show it.
+    pub fn fixed(&self, mesh: usize) -> Option<&'static str> {
+        let shown = self.nodes.get(mesh)?;
+        let mesh = &self.document.array("meshes").ok()?[mesh];
         let primitives = mesh.get("primitives").and_then(Value::as_array).into_iter().flatten();
         if primitives.into_iter().any(|primitive| primitive.get("targets").is_some()) {
             return Some("its morph targets would have to be moved");
         }
         let nodes = self.document.array("nodes").ok()?;
-        self.nodes[copy.mesh].iter().find_map(|&node| {
+        shown.iter().find_map(|&node| {
             let node = &nodes[node];
             let extensions = node.get("extensions").and_then(Value::as_object);
             let mut names = extensions.into_iter().flat_map(Map::keys);
@@ -256,8 +264,8 @@ fn show(document: &mut Document, shown: &BTreeMap<usize, (usize, Similarity)>) -
 
 /// What copies used before, and what they use instead.
 #[derive(Default)]
-struct Retired {
-    accessors: BTreeMap<usize, usize>,
+pub(super) struct Retired {
+    pub(super) accessors: BTreeMap<usize, usize>,
     views: BTreeMap<usize, usize>,
 }
 
@@ -289,7 +297,7 @@ impl Retired {
 
     /// Accessors that nothing uses any more become copies of those that stand for them. Answers the buffer views that
     /// lost a user, each with one that can stand for it.
-    fn settle(&self, document: &mut Document) -> Result<BTreeMap<usize, usize>, DocumentError> {
+    pub(super) fn settle(&self, document: &mut Document) -> Result<BTreeMap<usize, usize>, DocumentError> {
         let used = used_accessors(document)?;
         let used_views = packed_views(document)?;
         let unused = |(old, _): &(&usize, &usize)| !used_views.contains(old);
@@ -326,7 +334,7 @@ fn attribute(primitive: &Value, name: &str) -> Option<usize> {
     index(primitive.get("attributes")?, name)
 }
 
-fn names(object: Option<&Value>) -> impl Iterator<Item = &str> {
+pub(super) fn names(object: Option<&Value>) -> impl Iterator<Item = &str> {
     object.and_then(Value::as_object).into_iter().flat_map(|o| o.keys().map(String::as_str))
 }
 
@@ -336,13 +344,22 @@ fn primitives(document: &Document) -> Result<impl Iterator<Item = &Value>, Docum
 }
 
 /// Accessors that anything refers to.
-fn used_accessors(document: &Document) -> Result<BTreeSet<usize>, DocumentError> {
-    let mut used = BTreeSet::new();
+pub(super) fn used_accessors(document: &Document) -> Result<BTreeSet<usize>, DocumentError> {
+    let mut used = other_accessors(document)?;
     for primitive in primitives(document)? {
         used.extend(index(primitive, "indices"));
-        let targets = primitive.get("targets").and_then(Value::as_array).into_iter().flatten();
-        for object in primitive.get("attributes").into_iter().chain(targets) {
-            used.extend(names(Some(object)).filter_map(|name| index(object, name)));
+        let attributes = primitive.get("attributes");
+        used.extend(names(attributes).filter_map(|name| index(attributes?, name)));
+    }
+    Ok(used)
+}
+
+/// Accessors of morph targets, skins, animations and instances.
+pub(super) fn other_accessors(document: &Document) -> Result<BTreeSet<usize>, DocumentError> {
+    let mut used = BTreeSet::new();
+    for primitive in primitives(document)? {
+        for target in primitive.get("targets").and_then(Value::as_array).into_iter().flatten() {
+            used.extend(names(Some(target)).filter_map(|name| index(target, name)));
         }
     }
     used.extend(accessors_beside_meshes(document)?);

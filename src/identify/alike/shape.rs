@@ -46,7 +46,9 @@ pub(super) struct Shape<'a> {
     pub(super) spread: f64,
     /// Largest distance from it.
     pub(super) radius: f64,
-    /// Within this distance positions are the same: the tolerance, in the mesh's units.
+    /// What positions may be apart, as a fraction of the radius: the tolerance, or what they are rounded by.
+    pub(super) slack: f64,
+    /// The same in the mesh's units: within this distance positions are the same.
     pub(super) reach: f64,
     /// Of all labels.
     pub(super) signature: u64,
@@ -54,12 +56,20 @@ pub(super) struct Shape<'a> {
     pub(super) moments: [f64; 2],
 }
 
+/// What single precision does to a position of a part, where it came from and where it stands, and to the translation between
+/// them, as a fraction of its greatest coordinate: four units in the last place, each axis for itself.
+const ROUNDING: f64 = 4.0 / 8388608.0;
+
+/// Parts whose rounding is more than this fraction of their radius are too coarse for telling what is alike.
+const MOST_ROUNDING: f64 = 2.5e-4;
+
 /// How far off a first guess may be, in units of [`Shape::reach`].
 pub(super) const LOOSE: f64 = 32.0;
 
 impl<'a> Shape<'a> {
-    /// `None` for a mesh without extent. `tolerance` is a fraction of the radius.
-    pub(super) fn new(primitives: Vec<&'a Primitive>, tolerance: f64) -> Option<Self> {
+    /// `None` for a mesh without extent. `tolerance` is a fraction of the radius. If it `rounds`, what single precision rounds
+    /// its positions by is no difference either.
+    pub(super) fn new(primitives: Vec<&'a Primitive>, tolerance: f64, rounds: bool) -> Option<Self> {
         let corners: Vec<(u32, u32)> =
             (0..).zip(&primitives).flat_map(|(i, p)| p.indices.iter().map(move |&v| (i, v))).collect();
         let position = |&(p, v): &(u32, u32)| primitives[p as usize].positions()[v as usize];
@@ -79,7 +89,10 @@ impl<'a> Shape<'a> {
         };
         let spread = power(2).sqrt();
         let radius = points_exact.iter().map(|p| p.distance(middle)).fold(0.0, f64::max);
-        let reach = tolerance * radius;
+        let greatest = points_exact.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+        let rounding = if rounds { ROUNDING * greatest / radius } else { 0.0 };
+        let slack = tolerance.max(rounding.min(MOST_ROUNDING));
+        let reach = slack * radius;
         if !(0.0 < reach && 0.0 < spread && reach.is_finite() && spread.is_finite()) {
             return None;
         }
@@ -114,6 +127,7 @@ impl<'a> Shape<'a> {
             middle,
             spread,
             radius,
+            slack,
             reach,
             signature,
             moments,

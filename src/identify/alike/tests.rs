@@ -6,10 +6,10 @@ use crate::gltf::similarity;
 use crate::mesh::{Attribute, Format};
 
 /// A generator of numbers between 0 and 1.
-struct Chance(u64);
+pub(in crate::identify) struct Chance(pub(in crate::identify) u64);
 
 impl Chance {
-    fn next(&mut self) -> f64 {
+    pub(in crate::identify) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -19,7 +19,7 @@ impl Chance {
         similarity::rotation(DQuat::from_xyzw(part(), part(), part(), part()))
     }
 
-    fn order(&mut self, count: usize) -> Vec<usize> {
+    pub(in crate::identify) fn order(&mut self, count: usize) -> Vec<usize> {
         let mut order: Vec<usize> = (0..count).collect();
         for i in (1..count).rev() {
             order.swap(i, (self.next() * (i + 1) as f64) as usize);
@@ -28,17 +28,17 @@ impl Chance {
     }
 }
 
-fn attribute(name: &str, rows: &[[f32; 3]]) -> Attribute {
+pub(in crate::identify) fn attribute(name: &str, rows: &[[f32; 3]]) -> Attribute {
     Attribute { name: name.into(), components: 3, format: Format::F32, values: rows.as_flattened().to_vec() }
 }
 
-fn primitive(positions: &[[f32; 3]], normals: &[[f32; 3]], indices: Vec<u32>) -> Primitive {
+pub(in crate::identify) fn primitive(positions: &[[f32; 3]], normals: &[[f32; 3]], indices: Vec<u32>) -> Primitive {
     let attributes = vec![attribute("NORMAL", normals), attribute("POSITION", positions)];
     Primitive { count: positions.len(), attributes, targets: vec![], indices }
 }
 
 /// A box with flat faces: 24 vertices, 12 triangles.
-fn cuboid(size: [f32; 3]) -> Primitive {
+pub(in crate::identify) fn cuboid(size: [f32; 3]) -> Primitive {
     let (mut positions, mut normals, mut indices) = (vec![], vec![], vec![]);
     for axis in 0..3 {
         for side in [-1.0f32, 1.0] {
@@ -57,7 +57,7 @@ fn cuboid(size: [f32; 3]) -> Primitive {
 }
 
 /// A surface of revolution without seam: rings of equal vertices, closed at the ends.
-fn lathe(rings: &[(f32, f32)], segments: u32) -> Primitive {
+pub(in crate::identify) fn lathe(rings: &[(f32, f32)], segments: u32) -> Primitive {
     let (mut positions, mut indices) = (vec![], vec![]);
     for &(radius, height) in rings {
         for i in 0..segments {
@@ -85,7 +85,7 @@ fn sphere(segments: u32) -> Primitive {
 }
 
 /// No symmetry at all.
-fn rock() -> Primitive {
+pub(in crate::identify) fn rock() -> Primitive {
     let mut chance = Chance(5);
     let mut rock = sphere(12);
     rock.attributes[1].values.iter_mut().for_each(|v| *v *= 1.0 + 0.3 * chance.next() as f32);
@@ -93,7 +93,7 @@ fn rock() -> Primitive {
 }
 
 /// The same surface: moved, its vertices and triangles in another order, triangles turned.
-fn moved(source: &Primitive, by: &Similarity, chance: Option<&mut Chance>) -> Primitive {
+pub(in crate::identify) fn moved(source: &Primitive, by: &Similarity, chance: Option<&mut Chance>) -> Primitive {
     let vector = |v: &[f32]| DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]));
     let mut out = source.clone();
     for attribute in &mut out.attributes {
@@ -139,7 +139,7 @@ fn kinds(primitives: Vec<Primitive>) -> Vec<(usize, usize, Kind)> {
     matches(primitives).iter().map(|m| (m.mesh, m.of, m.kind)).collect()
 }
 
-fn random(chance: &mut Chance, scale: f64, mirror: bool) -> Similarity {
+pub(in crate::identify) fn random(chance: &mut Chance, scale: f64, mirror: bool) -> Similarity {
     let translation = DVec3::new(chance.next(), chance.next(), chance.next()) * 4.0 - 2.0;
     Similarity { scale, mirror, rotation: chance.rotation(), translation }
 }

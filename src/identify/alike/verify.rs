@@ -34,7 +34,7 @@ fn keyed(places: [u32; 3], number: u32) -> Keyed {
     ([a, b, c].min([b, c, a]).min([c, a, b]), number)
 }
 
-/// `None`: no match. `tolerance` is a fraction of the radius of `to`.
+/// `None`: no match. `tolerance` is that of normals and tangents; positions have that of their shapes.
 pub(super) fn verify(from: &Shape<'_>, to: &Shape<'_>, by: &Similarity, tolerance: f64) -> Option<Residual> {
     if from.corners.len() != to.corners.len() {
         return None;
@@ -125,7 +125,8 @@ impl Compared<'_, '_> {
             }
         }
         // All values are finite: readers refuse others.
-        if self.tolerance < worst.worst() {
+        let slack = from.slack.max(to.slack);
+        if slack < worst.position || self.tolerance < worst.normal.max(worst.tangent) {
             return None;
         }
         let ((p, v), (q, w)) = (from.corners[mine], to.corners[theirs]);
