@@ -309,7 +309,8 @@ fn parts_are_drawn_where_they_were() {
     let (mut files, mut parts) = (0, 0);
     for path in scenes(&corpus) {
         let Ok(scene) = read::read(&path) else { continue };
-        let splitting = Splitting::new(&scene.document, true).unwrap();
+        let is_read = |mesh: usize, primitive| triangles_of(&scene.meshes[mesh], primitive);
+        let splitting = Splitting::new(&scene.document, &is_read, true).unwrap();
         let search = Search {
             tolerance: TOLERANCE,
             most: Kind::Mirrored,
@@ -337,6 +338,10 @@ fn parts_are_drawn_where_they_were() {
     }
     println!("{parts} parts in {files} files");
     assert!(0 < parts);
+}
+
+fn triangles_of(mesh: &SourceMesh, primitive: usize) -> bool {
+    matches!(mesh.primitives[primitive], SourcePrimitive::Triangles(_))
 }
 
 fn same_points(path: &Path, before: &BTreeMap<usize, Vec<DVec3>>, after: &BTreeMap<usize, Vec<DVec3>>) {

@@ -7,7 +7,7 @@ use super::recover::{Recovered, declare};
 use crate::config::{InstanceSettings, Instancing, Recover};
 use crate::gltf::document::DocumentError;
 use crate::gltf::read::from_document;
-use crate::gltf::scene::Scene;
+use crate::gltf::scene::{Scene, SourcePrimitive};
 use crate::gltf::share::Sharing;
 use crate::gltf::split::{Repeated, Splitting, split};
 use crate::identify::alike::{Kind, Residual};
@@ -26,7 +26,10 @@ pub(super) fn take_apart(out: Recovered, settings: &InstanceSettings, base: &Pat
     if Sharing::unknown_extension(&out.scene.document).is_some() {
         return Ok(out);
     }
-    let splitting = Splitting::new(&out.scene.document, Recover::Similar <= settings.recover)?;
+    let meshes = &out.scene.meshes;
+    let is_read =
+        |mesh: usize, primitive: usize| matches!(meshes[mesh].primitives[primitive], SourcePrimitive::Triangles(_));
+    let splitting = Splitting::new(&out.scene.document, &is_read, Recover::Similar <= settings.recover)?;
     let node_bytes = if settings.instancing == Instancing::Gpu { INSTANCE_BYTES } else { NODE_BYTES };
     let search = Search {
         tolerance: settings.tolerance,

@@ -21,8 +21,13 @@ pub struct Splitting {
 }
 
 impl Splitting {
-    /// Looks at all meshes. `scales`: parts may be shown larger or smaller.
-    pub fn new(document: &Document, scales: bool) -> Result<Self, DocumentError> {
+    /// Looks at all meshes. `is_read`: the triangles of a primitive of a mesh were read, so all that it refers to is there. `scales`: parts
+    /// may be shown larger or smaller.
+    pub fn new(
+        document: &Document,
+        is_read: &dyn Fn(usize, usize) -> bool,
+        scales: bool,
+    ) -> Result<Self, DocumentError> {
         let sharing = Sharing::new(document)?;
         let meshes = document.array("meshes")?;
         let mut others = other_accessors(document)?;
@@ -31,14 +36,16 @@ impl Splitting {
         let mut looks: Vec<Vec<Result<usize, Obstacle>>> = Vec::with_capacity(meshes.len());
         for (i, mesh) in meshes.iter().enumerate() {
             let whole = of_mesh(&sharing, i);
-            let look = |primitive| {
-                if let Some(why) = whole.or_else(|| of_primitive(document, primitive, &others, scales)) {
+            let look = |(number, primitive)| {
+                let unread = || (!is_read(i, number)).then_some("it is no list of triangles");
+                let own = || unread().or_else(|| of_primitive(document, primitive, &others, scales));
+                if let Some(why) = whole.or_else(own) {
                     return Err(why);
                 }
                 let next = numbers.len();
                 Ok(*numbers.entry(appearance(primitive)).or_insert(next))
             };
-            looks.push(primitives(mesh).map(look).collect());
+            looks.push(primitives(mesh).enumerate().map(look).collect());
         }
         for domain in Domains::new(document)?.all() {
             if domain.users.iter().any(|&(mesh, primitive)| looks[mesh][primitive].is_err()) {

@@ -341,7 +341,7 @@ fn what_must_stay_whole_says_why() {
     let look = |change: &dyn Fn(&mut Document)| {
         let mut document = document(&[vec![row(&[0, 0, 1])]], Form::Apart, 1);
         change(&mut document);
-        Splitting::new(&document, true).unwrap().looks(0, 0)
+        Splitting::new(&document, &|_, _| true, true).unwrap().looks(0, 0)
     };
     let primitive = |change: &dyn Fn(&mut Value)| look(&|d| change(&mut d.json["meshes"][0]["primitives"][0]));
     assert_eq!(look(&|_| {}), Ok(0));
@@ -379,9 +379,10 @@ fn what_must_stay_whole_says_why() {
 
 #[test]
 fn looks_are_numbers_of_all_but_the_geometry() {
-    let mut made = document(&[vec![row(&[0]), row(&[1]), row(&[0])]], Form::Apart, 3);
+    let mut made = document(&[vec![row(&[0]), row(&[1]), row(&[0]), row(&[0])]], Form::Apart, 3);
     made.json["meshes"][0]["primitives"][2]["extras"] = json!({ "id": 1 });
-    let splitting = Splitting::new(&made, false).unwrap();
+    let splitting = Splitting::new(&made, &|_, primitive| primitive != 3, false).unwrap();
     assert_eq!([0, 1, 2].map(|primitive| splitting.looks(0, primitive)), [Ok(0), Ok(1), Ok(2)]);
+    assert!(splitting.looks(0, 3).is_err(), "it was not read");
     assert_eq!((splitting.shown(0), splitting.shown(1)), (3, 0));
 }
