@@ -7,7 +7,9 @@
     scale.py generate one|many|files FOLDER ..                       writes the scenes and measures nothing
 
 Instances stand on a plane, at random, turned and scaled at random (`--plain`: moved only). Options: --lodbake PATH, --keep FOLDER (with
-the scenes and outputs), --runs N (the least time of N cold runs). Nothing but Python's own library is needed.
+the scenes and outputs), --runs N (the least time of N cold runs), --cell RADII (of batches), --gltfpack PATH (simplifies each file to a
+half beside it, one process for each file, the first 200 of them; the time is that of all at their pace). Nothing but Python's own
+library is needed.
 """
 
 import argparse
@@ -30,6 +32,7 @@ output = "out"
 record = false
 [instances]
 instancing = "{form}"
+cell = {cell}
 [[lod]]
 ratio = 0.5
 [[lod]]
@@ -128,28 +131,48 @@ def write_files(folder, count, plain):
         write_scene(folder / f"{i // 1000:02}" / f"{i:05}.glb", chance.sample(shapes, 3), 9, plain)
 
 
-def bake(program, folder, form):
-    """Wall seconds, peak resident MiB, bytes of the outputs; from a cold cache."""
-    (folder / "pipeline.toml").write_text(PIPELINE.format(form=form))
-    subprocess.run(["rm", "-rf", folder / "out", folder / ".lodbake"], check=True)
+def timed(words):
+    """Wall seconds and peak resident MiB of a program."""
     began = time.perf_counter()
-    process = subprocess.Popen([program, "--quiet", folder / "pipeline.toml"])
+    process = subprocess.Popen([str(word) for word in words], stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
-    seconds = time.perf_counter() - began
     if status != 0:
-        sys.exit(f"{program} failed: {status}")
+        sys.exit(f"{words[0]} failed: {status}")
+    return time.perf_counter() - began, usage.ru_maxrss / 1024
+
+
+def bake(options, folder, form):
+    """Wall seconds, peak resident MiB, bytes of the outputs; from a cold cache."""
+    (folder / "pipeline.toml").write_text(PIPELINE.format(form=form, cell=options.cell))
+    subprocess.run(["rm", "-rf", folder / "out", folder / ".lodbake"], check=True)
+    seconds, memory = timed([options.lodbake, "--quiet", folder / "pipeline.toml"])
     size = sum(f.stat().st_size for f in (folder / "out").rglob("*") if f.is_file() and f.name != "report.json")
-    return seconds, usage.ru_maxrss / 1024, size
+    return seconds, memory, size
+
+
+def peer(program, folder, most=200):
+    """The same for one level of each file by gltfpack; of the first files, as if the others took as long."""
+    files = sorted((folder / "scenes").rglob("*.glb"))
+    out = folder / "peer.glb"
+    seconds, memory, size = 0.0, 0.0, 0
+    for file in files[:most]:
+        one = timed([program, "-i", file, "-o", out, "-si", "0.5", "-noq", "-kn"])
+        seconds, memory, size = seconds + one[0], max(memory, one[1]), size + out.stat().st_size
+    share = len(files) / len(files[:most])
+    return seconds * share, memory, int(size * share)
 
 
 def measure(options, folder, what, forms):
     source = sum(f.stat().st_size for f in (folder / "scenes").rglob("*.glb"))
     found = {}
     for form in forms:
-        runs = [bake(options.lodbake, folder, form) for _ in range(options.runs)]
+        runs = [bake(options, folder, form) for _ in range(options.runs)]
         seconds, memory, size = min(r[0] for r in runs), max(r[1] for r in runs), runs[0][2]
         found[form] = size
         print(f"| {what} | {form} | {source:,} | {size:,} | {seconds:.2f} | {memory:,.0f} |", flush=True)
+    if options.gltfpack:
+        seconds, memory, size = peer(options.gltfpack, folder)
+        print(f"| {what} | gltfpack | {source:,} | {size:,} | {seconds:.2f} | {memory:,.0f} |", flush=True)
     return found
 
 
@@ -163,6 +186,8 @@ def main():
     parser.add_argument("--forms", default="nodes,gpu")
     parser.add_argument("--plain", action="store_true")
     parser.add_argument("--runs", type=int, default=1)
+    parser.add_argument("--cell", type=float, default=32)
+    parser.add_argument("--gltfpack", type=Path)
     parser.add_argument("--keep", type=Path)
     options = parser.parse_args()
     options.lodbake = options.lodbake.resolve()
