@@ -1,9 +1,14 @@
-//! Shares one triangle budget among several recorded sequences: the cheapest contraction anywhere comes first.
+//! Shares one triangle budget among several recorded sequences: the cheapest contraction anywhere comes first. Among the parts
+//! of a mesh ([`Allocation`]), or among the meshes of a scene ([`SceneShares`]).
 //!
 //! Pure; knows sequences only. The instanced-model papers' scene-wide queue (IAS), restated on cuts: no mesh is
 //! simplified again.
 
+mod scene;
+
 use crate::simplify::progressive::Progressive;
+
+pub use scene::{Counts, SceneMesh, ScenePart, SceneShares};
 
 /// The instances of one sub-mesh in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,11 +28,19 @@ impl Default for Instances {
 /// The cuts of several sequences, for any number of triangles in sum.
 #[derive(Debug)]
 pub struct Allocation {
-    /// `(sequence, triangles that the step saves in all its instances)`, cheapest first; steps of one sequence stay in their
-    /// order.
-    order: Vec<(u32, u64)>,
+    /// Cheapest first; steps of one sequence stay in their order.
+    order: Vec<Ranked>,
     triangles: usize,
     sequences: usize,
+}
+
+#[derive(Debug)]
+struct Ranked {
+    /// Never falls.
+    cost: f32,
+    sequence: u32,
+    /// Triangles that the step saves, in all its instances.
+    saves: u64,
 }
 
 impl Allocation {
@@ -54,7 +67,10 @@ impl Allocation {
             ranked.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
         }
         Self {
-            order: ranked.into_iter().map(|(_, sequence, _, saves)| (sequence, saves)).collect(),
+            order: ranked
+                .into_iter()
+                .map(|(cost, sequence, _, saves)| Ranked { cost: cost as f32, sequence, saves })
+                .collect(),
             triangles: sequences.iter().map(|(s, instances)| s.triangles as usize * instances.count).sum(),
             sequences: sequences.len(),
         }
@@ -64,7 +80,7 @@ impl Allocation {
     pub fn cuts(&self, triangles: usize) -> Vec<usize> {
         let mut cuts = vec![0; self.sequences];
         let mut left = self.triangles;
-        for &(sequence, saves) in &self.order {
+        for &Ranked { sequence, saves, .. } in &self.order {
             if left <= triangles {
                 break;
             }
@@ -76,6 +92,11 @@ impl Allocation {
 }
 
 impl Allocation {
+    /// All steps in order.
+    fn priced(&self) -> &[Ranked] {
+        &self.order
+    }
+
     /// Steps of all sequences.
     pub fn steps(&self) -> usize {
         self.order.len()
@@ -84,7 +105,7 @@ impl Allocation {
     /// Number of steps of each sequence among the cheapest `steps` of all.
     pub fn cuts_after(&self, steps: usize) -> Vec<usize> {
         let mut cuts = vec![0; self.sequences];
-        self.order[..steps.min(self.order.len())].iter().for_each(|&(sequence, _)| cuts[sequence as usize] += 1);
+        self.order[..steps.min(self.order.len())].iter().for_each(|step| cuts[step.sequence as usize] += 1);
         cuts
     }
 }
@@ -94,7 +115,7 @@ mod tests {
     use super::*;
     use crate::simplify::progressive::Step;
 
-    fn sequence(costs: &[f32]) -> Progressive {
+    pub(super) fn sequence(costs: &[f32]) -> Progressive {
         let triangles = costs.len() as u32 * 2;
         let step =
             |(i, &cost): (usize, &f32)| Step { cost, triangles: triangles - 2 * (i as u32 + 1), ..Step::default() };

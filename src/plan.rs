@@ -127,8 +127,22 @@ impl Plan {
         look: Option<&MeshLook>,
         settings: &SceneSettings,
     ) -> MeshPlan {
+        match self.parts(source, sub_meshes, is_sealed, settings) {
+            Ok(parts) => self.chain(parts, look, settings),
+            Err(why) => MeshPlan::Alone(why),
+        }
+    }
+
+    /// Adds the sequences that a mesh needs: its parts, or why it gets no levels.
+    pub fn parts(
+        &mut self,
+        source: &SourceMesh,
+        sub_meshes: &[SubMesh],
+        is_sealed: bool,
+        settings: &SceneSettings,
+    ) -> Result<Vec<PartTask>, &'static str> {
         if sub_meshes.is_empty() {
-            return MeshPlan::Alone("it has no triangles");
+            return Err("it has no triangles");
         }
         let recipes = recipes(&settings.simplify);
         let shareable = !is_sealed && placement(&settings.simplify) == Placement::Subset;
@@ -143,8 +157,13 @@ impl Plan {
             })
             .collect();
         if parts.iter().all(|part| part.sequences.is_empty()) {
-            return MeshPlan::Alone("every part of it has fewer triangles than `min_triangles`");
+            return Err("every part of it has fewer triangles than `min_triangles`");
         }
+        Ok(parts)
+    }
+
+    /// Adds the chain of a mesh of these parts.
+    pub fn chain(&mut self, parts: Vec<PartTask>, look: Option<&MeshLook>, settings: &SceneSettings) -> MeshPlan {
         let judged = look.filter(|_| settings.looks_decide()).cloned();
         let rounds = if settings.simplify.has_rounds() && judged.is_some() { ROUNDS } else { 0 };
         let chain = &settings.chain;
@@ -152,7 +171,7 @@ impl Plan {
         let chain = || ChainTask {
             parts,
             settings: chain_settings(&settings.chain),
-            recipes: recipes.iter().map(recipe).collect(),
+            recipes: recipes(&settings.simplify).iter().map(recipe).collect(),
             rounds,
             judged,
         };
@@ -314,6 +333,8 @@ fn chain_settings(chain: &config::ChainSettings) -> ChainSettings {
         // The sphere's diameter is `size` pixels high.
         LevelTarget::Pixels { limit, size } => Target::ErrorOfMesh(2.0 * limit / size),
         LevelTarget::Appearance(limit) => Target::Appearance(limit),
+        // A budget that was not shared out asks nothing of a mesh: where it is shared, each mesh's number stands here.
+        LevelTarget::SceneRatio(_) | LevelTarget::SceneTriangles(_) | LevelTarget::SceneBytes(_) => Target::Ratio(1.0),
     };
     ChainSettings {
         targets: chain.levels.iter().map(target).collect(),

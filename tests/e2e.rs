@@ -27,6 +27,8 @@ mod library;
 mod methods;
 #[path = "e2e/report.rs"]
 mod report;
+#[path = "e2e/shares.rs"]
+mod shares;
 #[path = "e2e/study.rs"]
 mod study;
 #[path = "e2e/usage.rs"]

@@ -6,15 +6,14 @@
 use super::drawable::{Drawable, Instance, Part};
 use super::looks::Looks;
 use super::skin;
-use crate::gltf::accessor::Accessor;
 use crate::gltf::document::DocumentError;
-use crate::gltf::instancing::INSTANCING;
 use crate::gltf::json;
 use crate::gltf::lod::MSFT_LOD;
+use crate::gltf::places::{self, list, local};
 use crate::gltf::scene::{Scene, SourceMesh, SourcePrimitive};
 use crate::gltf::views::Views;
 use crate::mesh::{LevelPrimitive, Primitive};
-use glam::{DMat4, DQuat, DVec3};
+use glam::DMat4;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -103,7 +102,7 @@ impl<'a> Walk<'a> {
             let transform = parent * local(node);
             if let Some(mesh) = json::index(node, "mesh", format_args!("nodes[{number}]"))? {
                 let skin = json::index(node, "skin", format_args!("nodes[{number}]"))?;
-                for instance in self.batch(node, number)? {
+                for instance in places::instances(&self.scene.document, &self.views, number)? {
                     self.place(mesh, transform * instance, skin)?;
                 }
             }
@@ -136,33 +135,6 @@ impl<'a> Walk<'a> {
         Err(DocumentError::invalid(format!("nodes[{number}].extensions.{MSFT_LOD}"), words))
     }
 
-    /// Where a node's instances stand in its space: at its origin, unless `EXT_mesh_gpu_instancing` says otherwise.
-    fn batch(&self, node: &Value, number: usize) -> Result<Vec<DMat4>, DocumentError> {
-        let Some(extension) = json::extension(node, INSTANCING) else { return Ok(vec![DMat4::IDENTITY]) };
-        let place = format!("nodes[{number}].extensions.{INSTANCING}.attributes");
-        let attributes = extension.get("attributes").unwrap_or(&Value::Null);
-        let read = |name: &str, components: usize| -> Result<Option<Vec<f64>>, DocumentError> {
-            let Some(accessor) = json::index(attributes, name, &place)? else { return Ok(None) };
-            let numbers = Accessor::parse(&self.scene.document, accessor, &place)?.numbers(&self.views, None)?;
-            if numbers.components != components {
-                return Err(DocumentError::invalid(&place, format!("`{name}` must have {components} components")));
-            }
-            Ok(Some(numbers.values.into_iter().map(f64::from).collect()))
-        };
-        let (shifts, turns, scales) = (read("TRANSLATION", 3)?, read("ROTATION", 4)?, read("SCALE", 3)?);
-        let counts = [(&shifts, 3), (&turns, 4), (&scales, 3)];
-        let count = counts.iter().filter_map(|(v, n)| Some(v.as_ref()?.len() / n)).min();
-        let Some(count) = count else { return Ok(vec![DMat4::IDENTITY]) };
-        let at = |values: &Option<Vec<f64>>, i: usize, default: DVec3| {
-            values.as_ref().map_or(default, |v| DVec3::from_slice(&v[i * 3..]))
-        };
-        let instance = |i: usize| {
-            let turn = turns.as_ref().map_or(DQuat::IDENTITY, |v| unit(DQuat::from_slice(&v[i * 4..])));
-            DMat4::from_scale_rotation_translation(at(&scales, i, DVec3::ONE), turn, at(&shifts, i, DVec3::ZERO))
-        };
-        Ok((0..count).map(instance).collect())
-    }
-
     fn place(&mut self, mesh: usize, transform: DMat4, skin: Option<usize>) -> Result<(), DocumentError> {
         let (parts, transform) = match skin {
             // A skinned mesh stands where its joints are; its node's transform does not count.
@@ -184,7 +156,7 @@ impl<'a> Walk<'a> {
     }
 
     fn skinned(&mut self, mesh: usize, skin: usize) -> Result<Vec<usize>, DocumentError> {
-        let joints = skin::joints(&self.scene.document, &self.views, skin)?;
+        let joints = places::joints(&self.scene.document, &self.views, skin)?;
         let primitives = self.primitives(mesh);
         Ok(primitives.into_iter().map(|(p, material)| self.push(skin::pose(p, &joints, material))).collect())
     }
@@ -203,32 +175,4 @@ impl<'a> Walk<'a> {
         self.parts.push(Arc::new(part));
         self.parts.len() - 1
     }
-}
-
-/// The indices in `value[key]`; what is no index is left out.
-pub(super) fn list(value: &Value, key: &str) -> Vec<usize> {
-    let items = value.get(key).and_then(Value::as_array);
-    items.into_iter().flatten().filter_map(|i| Some(json::integer(i)? as usize)).collect()
-}
-
-/// A node's own transform. What is no transform changes nothing.
-pub(super) fn local(node: &Value) -> DMat4 {
-    fn numbers<const N: usize>(node: &Value, key: &str) -> Option<[f64; N]> {
-        let items = node.get(key)?.as_array()?;
-        let values: Vec<f64> = items.iter().filter_map(Value::as_f64).collect();
-        values.try_into().ok()
-    }
-    if let Some(matrix) = numbers::<16>(node, "matrix") {
-        return DMat4::from_cols_array(&matrix);
-    }
-    let shift = numbers::<3>(node, "translation").map_or(DVec3::ZERO, DVec3::from_array);
-    let turn = numbers::<4>(node, "rotation").map_or(DQuat::IDENTITY, |q| unit(DQuat::from_array(q)));
-    let scale = numbers::<3>(node, "scale").map_or(DVec3::ONE, DVec3::from_array);
-    DMat4::from_scale_rotation_translation(scale, turn, shift)
-}
-
-/// A rotation, whatever the file says.
-fn unit(turn: DQuat) -> DQuat {
-    let length = turn.dot(turn).sqrt();
-    if length > 0.0 && length.is_finite() { turn * (1.0 / length) } else { DQuat::IDENTITY }
 }

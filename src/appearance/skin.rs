@@ -1,53 +1,8 @@
 //! Skinned meshes at rest: vertices moved by the joints' nodes as the file leaves them. Animations do not run.
 
-use super::assemble::{list, local};
 use super::drawable::Part;
-use crate::gltf::accessor::Accessor;
-use crate::gltf::document::{Document, DocumentError};
-use crate::gltf::json;
-use crate::gltf::views::Views;
 use crate::mesh::Primitive;
 use glam::{DMat3, DMat4, DVec3};
-
-/// One matrix for each joint of a skin: from the mesh's space to the world.
-pub fn joints(document: &Document, views: &Views<'_>, skin: usize) -> Result<Vec<DMat4>, DocumentError> {
-    let nodes = document.array("nodes")?;
-    let Some(value) = document.array("skins")?.get(skin) else { return Ok(Vec::new()) };
-    let mut parents = vec![None; nodes.len()];
-    for (i, node) in nodes.iter().enumerate() {
-        for child in list(node, "children") {
-            if let Some(parent) = parents.get_mut(child) {
-                *parent = Some(i);
-            }
-        }
-    }
-    let world = |mut node: usize| {
-        let mut matrix = local(&nodes[node]);
-        // Nodes are a forest, as was checked on reading: this ends.
-        while let Some(parent) = parents[node] {
-            matrix = local(&nodes[parent]) * matrix;
-            node = parent;
-        }
-        matrix
-    };
-    let place = format!("skins[{skin}]");
-    let inverse = match json::index(value, "inverseBindMatrices", &place)? {
-        None => Vec::new(),
-        Some(index) => {
-            let numbers = Accessor::parse(document, index, &place)?.numbers(views, None)?;
-            if numbers.components != 16 {
-                return Err(DocumentError::invalid(&place, "`inverseBindMatrices` must be of type `MAT4`"));
-            }
-            numbers.values
-        }
-    };
-    let bind = |i: usize| {
-        let matrix = inverse.get(i * 16..i * 16 + 16);
-        matrix.map_or(DMat4::IDENTITY, |m| DMat4::from_cols_array(&std::array::from_fn(|k| f64::from(m[k]))))
-    };
-    let joints = list(value, "joints").into_iter().filter(|node| *node < nodes.len()).enumerate();
-    Ok(joints.map(|(i, node)| world(node) * bind(i)).collect())
-}
 
 /// A primitive in the pose of `joints`.
 pub fn pose(primitive: &Primitive, joints: &[DMat4], material: usize) -> Part {

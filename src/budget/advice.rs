@@ -102,6 +102,9 @@ pub fn level(mesh: &MeshRecord, level: u64, fact: Fact, bound: f64) -> String {
                 LevelTarget::Error { limit, .. } => format!("an error below {limit}"),
                 LevelTarget::Pixels { limit, .. } => format!("fewer pixels than {limit}"),
                 LevelTarget::Appearance(limit) => format!("an appearance below {limit}"),
+                LevelTarget::SceneRatio(ratio) => format!("a higher scene_ratio than {ratio}"),
+                LevelTarget::SceneTriangles(triangles) => format!("more than {} scene_triangles", count(triangles)),
+                LevelTarget::SceneBytes(bytes) => format!("more than {} scene_bytes", count(bytes)),
             };
             let exact = if fact == Fact::DRms { ", a level by `appearance`" } else { "" };
             format!("ask for {target} at level {level}{exact}, or try `effort = \"best\"`")

@@ -32,6 +32,7 @@ pub(crate) fn scene(path: &str) -> SceneRecord {
         draw_calls: 6,
         copy_of: (index == 1).then_some(0),
         instance_of: None,
+        shares: Vec::new(),
         triangles: 1000,
         vertices: 600,
         radius: 2.0,

@@ -197,7 +197,8 @@ mod tests {
     #[test]
     fn the_example_names_every_key() {
         let schema = schema();
-        let tables = ["Screen", "Simplify", "Appearance", "Limit", "Growth"].map(|name| format!("/$defs/{name}Table"));
+        let tables =
+            ["Screen", "Simplify", "Appearance", "Scene", "Limit", "Growth"].map(|name| format!("/$defs/{name}Table"));
         let entries = ["Lod", "Override", "Budget"].map(|name| format!("/$defs/{name}Entry"));
         for table in tables.iter().chain(&entries).map(String::as_str).chain([""]) {
             for key in schema.pointer(table).unwrap()["properties"].as_object().unwrap().keys() {

@@ -102,6 +102,9 @@ pub(super) struct PipelineFile {
     /// Which repeated meshes become instances, and how these are written.
     pub instances: Option<InstancesTable>,
 
+    /// From where scenes are seen, for levels by `scene_ratio`, `scene_triangles` and `scene_bytes`.
+    pub scene: Option<SceneTable>,
+
     /// The levels, finest first. Default: ratios 0.5, 0.25 and 0.1.
     #[schemars(length(min = 1, max = 32))]
     pub lod: Option<Vec<LodEntry>>,
@@ -241,10 +244,26 @@ pub(super) struct InstancesTable {
     pub required: Option<bool>,
 }
 
-/// One level: exactly one of `ratio`, `triangles`, `error`, `pixels` and `appearance` says how coarse it is.
+/// From where scenes are seen, where their meshes share budgets: an error counts as large as it appears from there. Without any
+/// place, errors count as large as they are in the scene.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{ "required": ["ratio"] }, { "required": ["triangles"] }, { "required": ["error"] }, { "required": ["pixels"] }, { "required": ["appearance"] }]))]
+pub(super) struct SceneTable {
+    /// Places of cameras, `[x, y, z]` in the scene's space. Default: none.
+    #[schemars(length(max = 1000), extend("default" = []))]
+    pub cameras: Option<Vec<[f64; 3]>>,
+
+    /// Distances of cameras from the middle of the scene, in its units; each stands for cameras all round; more than 0. Default:
+    /// none.
+    #[schemars(length(max = 32), extend("default" = [], "items" = { "type": "number", "exclusiveMinimum": 0 }))]
+    pub distances: Option<Vec<f64>>,
+}
+
+/// One level: exactly one of `ratio`, `triangles`, `error`, `pixels`, `appearance`, `scene_ratio`, `scene_triangles` and
+/// `scene_bytes` says how coarse it is.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["ratio"] }, { "required": ["triangles"] }, { "required": ["error"] }, { "required": ["pixels"] }, { "required": ["appearance"] }, { "required": ["scene_ratio"] }, { "required": ["scene_triangles"] }, { "required": ["scene_bytes"] }]))]
 pub(super) struct LodEntry {
     /// Share of each mesh's triangles that is left; between 0 and 1, exclusive.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
@@ -274,6 +293,20 @@ pub(super) struct LodEntry {
     /// Largest image difference from the source (d_RMS, luminance 0 to 255 over 24 views); more than 0.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub appearance: Option<f64>,
+
+    /// Share of the triangles that all nodes of a scene draw; its meshes share them so that the scene loses least; between 0
+    /// and 1, exclusive.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+    pub scene_ratio: Option<f64>,
+
+    /// Number of triangles that all nodes of a scene draw, shared as with `scene_ratio`; 1 or more.
+    #[schemars(range(min = 1))]
+    pub scene_triangles: Option<u64>,
+
+    /// Bytes of vertices and indices of all distinct meshes of a scene, each counted once, shared as with `scene_ratio`; 1 or
+    /// more. Estimated from counts: bytes of a vertex as the source keeps it, three indices a triangle, no compression.
+    #[schemars(range(min = 1))]
+    pub scene_bytes: Option<u64>,
 
     /// Share of the viewport's height taken by the bounding sphere below which this level is shown; more than 0, at
     /// most 1. Give it for all levels or for none. Default: computed from the level's error and `[screen]`.
@@ -319,6 +352,9 @@ pub(super) struct OverrideEntry {
 
     /// As `[instances]`; keys that are not given keep their value.
     pub instances: Option<InstancesTable>,
+
+    /// As `[scene]`; keys that are not given keep their value.
+    pub scene: Option<SceneTable>,
 
     /// As `[[lod]]`; replaces the whole list.
     #[schemars(length(min = 1, max = 32))]

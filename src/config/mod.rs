@@ -27,7 +27,7 @@ pub use file::schema;
 pub use globs::Globs;
 pub use settings::{
     AppearanceSettings, ChainSettings, EmitSettings, InstanceSettings, LevelTarget, SceneSettings, Screen,
-    SimplifySettings, Weights,
+    SimplifySettings, ViewSettings, Weights,
 };
 
 /// A folder: as the user wrote it, for messages, and where it is.

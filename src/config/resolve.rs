@@ -7,12 +7,13 @@ use super::check::Document;
 use super::choice::{ErrorUnit, Layout, Placement, Recover, Storage};
 use super::error::{ConfigError, Place};
 use super::file::{
-    AppearanceTable, InstancesTable, LodEntry, OneOrMany, OverrideEntry, PipelineFile, ScreenTable, SimplifyTable,
+    AppearanceTable, InstancesTable, LodEntry, OneOrMany, OverrideEntry, PipelineFile, SceneTable, ScreenTable,
+    SimplifyTable,
 };
 use super::globs::Globs;
 use super::settings::{
     AppearanceSettings, ChainSettings, EmitSettings, InstanceSettings, LevelTarget, SceneSettings, Screen,
-    SimplifySettings, Weights,
+    SimplifySettings, ViewSettings, Weights,
 };
 use super::{Folder, Pipeline, budget, defaults};
 
@@ -29,6 +30,7 @@ pub(super) struct Layer {
     simplify: SimplifyTable,
     appearance: AppearanceTable,
     instances: InstancesTable,
+    scene: SceneTable,
     lod: Option<Vec<LodEntry>>,
 }
 
@@ -45,6 +47,7 @@ impl Layer {
         lay!(over.simplify, self.simplify; metric, effort, normal, texcoord, color, border, seam, crease);
         lay!(over.simplify, self.simplify; placement, min_triangles, lock_border, candidates);
         lay!(over.appearance, self.appearance; record, size);
+        lay!(over.scene, self.scene; cameras, distances);
         lay!(over.instances, self.instances; recover, tolerance, split, instancing, cell, names, required);
     }
 
@@ -87,6 +90,10 @@ impl Layer {
                 names: self.instances.names.unwrap_or_default(),
                 // The profile promises a file without required extensions.
                 required: self.instances.required.unwrap_or(self.profile != Some(super::Profile::Core)),
+            },
+            scene: ViewSettings {
+                cameras: self.scene.cameras.clone().unwrap_or_default(),
+                distances: self.scene.distances.clone().unwrap_or_default(),
             },
         };
         if self.appearance.size.is_none() && settings.looks_decide() {
@@ -152,6 +159,7 @@ pub(super) fn pipeline(document: &Document<'_>, file: &str) -> Result<Pipeline, 
         simplify: typed.simplify.unwrap_or_default(),
         appearance: typed.appearance.unwrap_or_default(),
         instances: typed.instances.unwrap_or_default(),
+        scene: typed.scene.unwrap_or_default(),
         lod: typed.lod,
     };
     check_layer(document, &top, &layer)?;
@@ -199,6 +207,7 @@ fn override_layer(document: &Document<'_>, place: &Place, entry: OverrideEntry) 
         simplify: entry.simplify.unwrap_or_default(),
         appearance: entry.appearance.unwrap_or_default(),
         instances: entry.instances.unwrap_or_default(),
+        scene: entry.scene.unwrap_or_default(),
         lod: entry.lod,
     };
     check_layer(document, place, &layer)?;
@@ -231,7 +240,8 @@ fn check_layer(document: &Document<'_>, place: &Place, layer: &Layer) -> Result<
     for (i, entry) in entries.iter().enumerate() {
         let place = place.index(i);
         if target(entry).is_none() {
-            let text = "must have exactly one of `ratio`, `triangles`, `error`, `pixels` and `appearance`";
+            let text = "must have exactly one of `ratio`, `triangles`, `error`, `pixels`, `appearance`, `scene_ratio`, \
+                        `scene_triangles` and `scene_bytes`";
             return Err(document.invalid(&place, text));
         }
         if entry.unit.is_some() && entry.error.is_none() {
@@ -262,7 +272,7 @@ fn check_split(document: &Document<'_>, place: &Place, layer: &Layer, laid: &Lay
     Ok(())
 }
 
-/// Exactly one of the five, or `None`.
+/// Exactly one of them, or `None`.
 fn target(entry: &LodEntry) -> Option<LevelTarget> {
     let unit = entry.unit.unwrap_or_default();
     let given = [
@@ -272,6 +282,9 @@ fn target(entry: &LodEntry) -> Option<LevelTarget> {
         // Without `size`, which is checked apart, any height will do.
         entry.pixels.map(|limit| LevelTarget::Pixels { limit, size: entry.size.unwrap_or(1.0) }),
         entry.appearance.map(LevelTarget::Appearance),
+        entry.scene_ratio.map(LevelTarget::SceneRatio),
+        entry.scene_triangles.map(LevelTarget::SceneTriangles),
+        entry.scene_bytes.map(LevelTarget::SceneBytes),
     ];
     let mut given = given.into_iter().flatten();
     given.next().filter(|_| given.next().is_none())
@@ -293,6 +306,15 @@ fn not_coarser(finer: &LodEntry, entry: &LodEntry) -> Option<String> {
         }
         (LevelTarget::Triangles(before), LevelTarget::Triangles(now)) if now >= before => {
             Some(descends("triangles", before.to_string(), now.to_string()))
+        }
+        (LevelTarget::SceneRatio(before), LevelTarget::SceneRatio(now)) if now >= before => {
+            Some(descends("scene_ratio", before.to_string(), now.to_string()))
+        }
+        (LevelTarget::SceneTriangles(before), LevelTarget::SceneTriangles(now)) if now >= before => {
+            Some(descends("scene_triangles", before.to_string(), now.to_string()))
+        }
+        (LevelTarget::SceneBytes(before), LevelTarget::SceneBytes(now)) if now >= before => {
+            Some(descends("scene_bytes", before.to_string(), now.to_string()))
         }
         (LevelTarget::Error { limit: before, unit: old }, LevelTarget::Error { limit: now, unit })
             if old == unit && now <= before =>

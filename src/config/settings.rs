@@ -28,6 +28,19 @@ pub struct SceneSettings {
     /// Which repeated meshes become instances, and how these are written. Absent in records of earlier versions.
     #[serde(default)]
     pub instances: InstanceSettings,
+    /// From where a scene is seen whose meshes share budgets. Absent in records of earlier versions.
+    #[serde(default)]
+    pub scene: ViewSettings,
+}
+
+/// From where a scene is seen. Nothing given: from anywhere, near every mesh.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct ViewSettings {
+    /// Places in the scene's space.
+    pub cameras: Vec<[f64; 3]>,
+    /// Distances from the middle of the scene, in its units; each stands for places all round at that distance; more than 0.
+    pub distances: Vec<f64>,
 }
 
 /// Which repeated meshes become instances, and how instances are written.
@@ -175,12 +188,26 @@ pub enum LevelTarget {
     },
     /// Image difference from the source, d_RMS: root mean square of luminance (0…255) over 24 views.
     Appearance(f64),
+    /// Share of the triangles that all nodes of the scene draw, between 0 and 1, exclusive.
+    #[serde(rename = "scene_ratio")]
+    SceneRatio(f64),
+    /// Triangles that all nodes of the scene draw, 1 or more.
+    #[serde(rename = "scene_triangles")]
+    SceneTriangles(u64),
+    /// Bytes of vertices and indices of a scene's distinct meshes, 1 or more.
+    #[serde(rename = "scene_bytes")]
+    SceneBytes(u64),
 }
 
 impl LevelTarget {
     /// Whether pictures have to be drawn to find the level.
     pub fn is_looked_at(&self) -> bool {
         matches!(self, Self::Appearance(_))
+    }
+
+    /// Whether it is a budget that all meshes of a scene share.
+    pub fn is_of_scene(&self) -> bool {
+        matches!(self, Self::SceneRatio(_) | Self::SceneTriangles(_) | Self::SceneBytes(_))
     }
 }
 
@@ -209,6 +236,11 @@ impl SimplifySettings {
 }
 
 impl SceneSettings {
+    /// Whether any level is a budget that all meshes of a scene share.
+    pub fn shares_a_budget(&self) -> bool {
+        self.chain.levels.iter().any(LevelTarget::is_of_scene)
+    }
+
     /// Whether looks decide any byte of the outputs.
     pub fn looks_decide(&self) -> bool {
         self.simplify.has_choice() || self.chain.levels.iter().any(LevelTarget::is_looked_at)

@@ -51,11 +51,11 @@ fn paths_are_relative_to_the_file() {
 
 #[test]
 fn unknown_keys_name_the_nearest() {
-    insta::assert_snapshot!(refused("sotrage = 'shared'"), @"unknown key `sotrage` in `project/pipeline.toml` line 3 (did you mean `storage`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `layout`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `instances`, `lod`, `override`, `budget`, `baseline`)");
+    insta::assert_snapshot!(refused("sotrage = 'shared'"), @"unknown key `sotrage` in `project/pipeline.toml` line 3 (did you mean `storage`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `layout`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `instances`, `scene`, `lod`, `override`, `budget`, `baseline`)");
     insta::assert_snapshot!(refused("[screen]\npixel = 2"), @"unknown key `screen.pixel` in `project/pipeline.toml` line 4 (did you mean `pixels`? known: `pixels`, `height`, `fov`)");
-    insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\n[[lod]]\ntriangle = 5"), @"unknown key `lod[1].triangle` in `project/pipeline.toml` line 6 (did you mean `triangles`? known: `ratio`, `triangles`, `error`, `unit`, `pixels`, `size`, `appearance`, `coverage`)");
+    insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\n[[lod]]\ntriangle = 5"), @"unknown key `lod[1].triangle` in `project/pipeline.toml` line 6 (did you mean `triangles`? known: `ratio`, `triangles`, `error`, `unit`, `pixels`, `size`, `appearance`, `scene_ratio`, `scene_triangles`, `scene_bytes`, `coverage`)");
     insta::assert_snapshot!(refused("normal = 0.1"), @r"
-    unknown key `normal` in `project/pipeline.toml` line 3 (did you mean `format`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `layout`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `instances`, `lod`, `override`, `budget`, `baseline`)
+    unknown key `normal` in `project/pipeline.toml` line 3 (did you mean `format`? known: `input`, `output`, `include`, `exclude`, `ignore_files`, `follow_links`, `cache`, `jobs`, `format`, `storage`, `layout`, `profile`, `vertex_cache`, `screen`, `simplify`, `appearance`, `instances`, `scene`, `lod`, `override`, `budget`, `baseline`)
     hint: `normal` is a key of `[simplify]`
     ");
     insta::assert_snapshot!(refused("[simplify]\nseam = 1\njobs = 2"), @r"
@@ -86,6 +86,8 @@ fn metrics_that_keep_to_source_vertices_refuse_to_move_them() {
 fn ranges_are_stated() {
     insta::assert_snapshot!(refused("[[lod]]\nratio = 1.5"), @"`project/pipeline.toml` line 4: lod[0].ratio 1.5 is out of range: must be between 0 and 1, exclusive");
     insta::assert_snapshot!(refused("[[lod]]\nratio = 0"), @"`project/pipeline.toml` line 4: lod[0].ratio 0 is out of range: must be between 0 and 1, exclusive");
+    insta::assert_snapshot!(refused("[[lod]]\nscene_ratio = 1"), @"`project/pipeline.toml` line 4: lod[0].scene_ratio 1 is out of range: must be between 0 and 1, exclusive");
+    insta::assert_snapshot!(refused("[[lod]]\nscene_triangles = 0"), @"`project/pipeline.toml` line 4: lod[0].scene_triangles 0 is out of range: must be 1 or more");
     insta::assert_snapshot!(refused("[[lod]]\ntriangles = 0"), @"`project/pipeline.toml` line 4: lod[0].triangles 0 is out of range: must be 1 or more");
     insta::assert_snapshot!(refused("[[lod]]\ntriangles = 5_000_000_000"), @"`project/pipeline.toml` line 4: lod[0].triangles 5_000_000_000 is out of range: must be between 1 and 4294967295, both inclusive");
     insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\ncoverage = 1.01"), @"`project/pipeline.toml` line 5: lod[0].coverage 1.01 is out of range: must be more than 0 and at most 1");
@@ -133,12 +135,18 @@ fn absent_and_broken() {
 
 #[test]
 fn rules_between_keys() {
-    insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\nerror = 0.1"), @"`project/pipeline.toml` line 3: lod[0] must have exactly one of `ratio`, `triangles`, `error`, `pixels` and `appearance`");
-    insta::assert_snapshot!(refused("[[lod]]\ncoverage = 0.5"), @"`project/pipeline.toml` line 3: lod[0] must have exactly one of `ratio`, `triangles`, `error`, `pixels` and `appearance`");
+    insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\nerror = 0.1"), @"`project/pipeline.toml` line 3: lod[0] must have exactly one of `ratio`, `triangles`, `error`, `pixels`, `appearance`, `scene_ratio`, `scene_triangles` and `scene_bytes`");
+    insta::assert_snapshot!(refused("[[lod]]\ncoverage = 0.5"), @"`project/pipeline.toml` line 3: lod[0] must have exactly one of `ratio`, `triangles`, `error`, `pixels`, `appearance`, `scene_ratio`, `scene_triangles` and `scene_bytes`");
     insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\nunit = 'object'"), @"`project/pipeline.toml` line 5: lod[0].unit is the unit of `error`, which this level does not have");
     insta::assert_snapshot!(refused("[[lod]]\nratio = 0.5\n\n[[lod]]\nratio = 0.5"), @"`project/pipeline.toml` line 6: lod[1] has ratio 0.5 after 0.5: levels go from fine to coarse, ratio must become smaller");
     insta::assert_snapshot!(refused("lod = [{triangles = 9}, {error = 1}, {triangles = 10}]"), @"`project/pipeline.toml` line 3: lod[2] has triangles 10 after 9: levels go from fine to coarse, triangles must become smaller");
     insta::assert_snapshot!(refused("lod = [{error = 0.1}, {error = 0.01}]"), @"`project/pipeline.toml` line 3: lod[1] has error 0.01 after 0.1: levels go from fine to coarse, error must grow");
+    insta::assert_snapshot!(refused("lod = [{scene_ratio = 0.5}, {ratio = 0.5}, {scene_ratio = 0.6}]"), @"`project/pipeline.toml` line 3: lod[2] has scene_ratio 0.6 after 0.5: levels go from fine to coarse, scene_ratio must become smaller");
+    insta::assert_snapshot!(refused("lod = [{scene_triangles = 500}, {scene_triangles = 500}]"), @"`project/pipeline.toml` line 3: lod[1] has scene_triangles 500 after 500: levels go from fine to coarse, scene_triangles must become smaller");
+    insta::assert_snapshot!(refused("lod = [{scene_bytes = 500}, {scene_bytes = 501}]"), @"`project/pipeline.toml` line 3: lod[1] has scene_bytes 501 after 500: levels go from fine to coarse, scene_bytes must become smaller");
+    insta::assert_snapshot!(refused("scene.distances = [1, 0]"), @"`project/pipeline.toml` line 3: scene.distances[1] 0 is out of range: must be more than 0");
+    insta::assert_snapshot!(refused("scene.cameras = [[1, 2]]"), @"`project/pipeline.toml` line 3: scene.cameras[0] has 2 entries: must have between 3 and 3, both inclusive");
+    insta::assert_snapshot!(refused("lod = [{scene_ratio = 0.5, triangles = 5}]"), @"`project/pipeline.toml` line 3: lod[0] must have exactly one of `ratio`, `triangles`, `error`, `pixels`, `appearance`, `scene_ratio`, `scene_triangles` and `scene_bytes`");
     insta::assert_snapshot!(refused("lod = [{appearance = 2}, {appearance = 1}]"), @"`project/pipeline.toml` line 3: lod[1] has appearance 1 after 2: levels go from fine to coarse, the difference must grow");
     insta::assert_snapshot!(refused("lod = [{pixels = 1, size = 200}, {pixels = 1, size = 300}]"), @"`project/pipeline.toml` line 3: lod[1] has 1 pixels at 300 after 1 at 200: levels go from fine to coarse, pixels must grow or size must become smaller");
     insta::assert_snapshot!(refused("lod = [{pixels = 1}]"), @"`project/pipeline.toml` line 3: lod[0] needs `pixels` and `size` together: the error in pixels of a mesh that is `size` pixels high");
@@ -207,6 +215,21 @@ fn later_overrides_win_key_by_key() {
     assert_eq!(small.emit.coverage, Some(vec![0.2]));
     assert_eq!(pipeline.settings_for("street/lamp.glb"), prop);
     assert_eq!(pipeline.settings_for("street/north/lamp.glb"), plain, "`*` stays within a folder");
+}
+
+#[test]
+fn views_are_laid_key_by_key() {
+    let pipeline = minimal(
+        "scene = { cameras = [[1, 2, 3.5]], distances = [10, 20] }
+         [[override]]
+         match = 'inside/**'
+         scene.distances = []",
+    )
+    .unwrap();
+    let views = |path| pipeline.settings_for(path).scene;
+    assert_eq!(views("a.glb"), ViewSettings { cameras: vec![[1.0, 2.0, 3.5]], distances: vec![10.0, 20.0] });
+    assert_eq!(views("inside/a.glb"), ViewSettings { cameras: vec![[1.0, 2.0, 3.5]], distances: vec![] });
+    assert_eq!(minimal("").unwrap().settings().scene, ViewSettings::default());
 }
 
 /// Every key that an override has also stands at the top, with the same schema: a new key cannot be forgotten there.

@@ -28,6 +28,7 @@ pub mod library;
 pub mod lod;
 mod notes;
 pub mod package;
+pub mod places;
 pub mod primitive;
 pub mod read;
 pub mod rules;

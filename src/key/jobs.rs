@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{ALGORITHM_VERSION, EMIT_VERSION, FORMAT_VERSION, Manifest, ManifestWriter};
+use super::{ALGORITHM_VERSION, EMIT_VERSION, FORMAT_VERSION, Manifest, ManifestWriter, SHARE_VERSION};
 use crate::config::{
     ChainSettings, EmitSettings, InstanceSettings, Instancing, Layout, LevelTarget, Metric, Recover, SceneSettings,
-    Screen, SimplifySettings, Weights,
+    Screen, SimplifySettings, ViewSettings, Weights,
 };
 use crate::mesh::Mesh;
 use crate::mesh::hash::MeshHash;
@@ -58,7 +58,7 @@ impl Manifest for SequenceJob<'_> {
 impl Manifest for SceneSettings {
     fn write(&self, to: &mut dyn ManifestWriter) {
         // `skip` decides whether there is an output at all.
-        let Self { skip: _, min_triangles, simplify, chain, emit, appearance, instances } = self;
+        let Self { skip: _, min_triangles, simplify, chain, emit, appearance, instances, scene } = self;
         to.integer("format_version", FORMAT_VERSION.into());
         to.integer("algorithm_version", ALGORITHM_VERSION.into());
         to.integer("emit_version", EMIT_VERSION.into());
@@ -74,6 +74,10 @@ impl Manifest for SceneSettings {
             to.integer("look_size", appearance.size.into());
         }
         write_instances(instances, to);
+        if self.shares_a_budget() {
+            to.integer("share_version", SHARE_VERSION.into());
+            write_views(scene, to);
+        }
     }
 }
 
@@ -128,7 +132,24 @@ pub fn write_chain(settings: &ChainSettings, to: &mut dyn ManifestWriter) {
                 to.number("size", size);
             }
             LevelTarget::Appearance(limit) => to.number("appearance", limit),
+            LevelTarget::SceneRatio(ratio) => to.number("scene_ratio", ratio),
+            LevelTarget::SceneTriangles(triangles) => to.integer("scene_triangles", triangles),
+            LevelTarget::SceneBytes(bytes) => to.integer("scene_bytes", bytes),
         });
+    }
+}
+
+fn write_views(settings: &ViewSettings, to: &mut dyn ManifestWriter) {
+    let ViewSettings { cameras, distances } = settings;
+    for (i, camera) in cameras.iter().enumerate() {
+        to.group(&format!("scene.cameras[{i}]"), |to| {
+            for (name, &value) in ["x", "y", "z"].iter().zip(camera) {
+                to.number(name, value);
+            }
+        });
+    }
+    for (i, &distance) in distances.iter().enumerate() {
+        to.number(&format!("scene.distances[{i}]"), distance);
     }
 }
 

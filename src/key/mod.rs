@@ -27,6 +27,9 @@ pub const LOOK_VERSION: u32 = 1;
 /// Form of the outputs. Raise it in the commit that writes the same levels in another way.
 pub const EMIT_VERSION: u32 = 4;
 
+/// How the meshes of a scene share a budget. Raise it in the commit that shares the same budget in another way.
+pub const SHARE_VERSION: u32 = 1;
+
 /// Declares a 32-byte name, shown as 64 hexadecimal digits.
 macro_rules! digest {
     ($(#[$meta:meta])* $name:ident) => {

@@ -41,7 +41,7 @@ const LEVELS: &[&str] = &["chain", "scene"];
 const SCENE: &[&str] = &["scene"];
 
 /// Every setting of a scene, another value for it, and the keys that it must change.
-const CASES: [(&str, &[&str], &str); 29] = [
+const CASES: [(&str, &[&str], &str); 31] = [
     (
         "simplify.metric = 'qem'",
         ALL,
@@ -79,6 +79,16 @@ const CASES: [(&str, &[&str], &str); 29] = [
         "lod = [{ ratio = 0.5 }, { pixels = 1, size = 300 }, { appearance = 4 }]",
         LEVELS,
         "lod[1].pixels: (none) -> 1.0; lod[1].size: (none) -> 300.0; lod[2].appearance: (none) -> 4.0; look_size: 64 -> 128; lod[1].ratio: 0.25 -> (none); lod[2].ratio: 0.1 -> (none)",
+    ),
+    (
+        "lod = [{ ratio = 0.5 }, { scene_ratio = 0.25 }, { scene_triangles = 1000 }]",
+        LEVELS,
+        "lod[1].scene_ratio: (none) -> 0.25; lod[2].scene_triangles: (none) -> 1000; share_version: (none) -> 1; lod[1].ratio: 0.25 -> (none); lod[2].ratio: 0.1 -> (none)",
+    ),
+    (
+        "lod = [{ ratio = 0.5 }, { ratio = 0.25 }, { scene_bytes = 500 }]\nscene = { cameras = [[1, 2, 3]], distances = [4] }",
+        LEVELS,
+        "lod[2].scene_bytes: (none) -> 500; share_version: (none) -> 1; scene.cameras[0].x: (none) -> 1.0; scene.cameras[0].y: (none) -> 2.0; scene.cameras[0].z: (none) -> 3.0; scene.distances[0]: (none) -> 4.0; lod[2].ratio: 0.1 -> (none)",
     ),
     ("appearance.record = false", SCENE, "record_looks: true -> false; look_size: 64 -> (none)"),
     ("appearance.size = 256", SCENE, "look_size: 64 -> 256"),
@@ -163,6 +173,7 @@ fn what_is_not_used_is_not_in_the_key() {
     }
     for line in [
         "instances.tolerance = 1e-3",
+        "scene = { cameras = [[1, 2, 3]], distances = [4] }",
         "instances = { cell = 20, names = 'drop', required = false }",
         "jobs = 3",
         "cache = 'x'",

@@ -243,6 +243,9 @@ pub struct MeshRecord {
     pub pieces: Vec<PieceRecord>,
     /// Its levels, finest first, without the source; empty if it is left alone.
     pub levels: Vec<LevelRecord>,
+    /// What it gets of the levels that are budgets of the scene. Absent in records of earlier versions.
+    #[serde(default)]
+    pub shares: Vec<ShareRecord>,
     /// What a person should know, e.g. why there are no levels, or an extension that levels do not carry.
     pub notes: Vec<String>,
 }
@@ -326,6 +329,16 @@ pub struct LevelRecord {
     /// Sampled distances between source and level, in units of the mesh's own space.
     #[serde(default)]
     pub surface: Option<SurfaceDistance>,
+}
+
+/// What a mesh gets of a level that all meshes of its scene share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct ShareRecord {
+    /// Number of the target, from 1.
+    pub level: u64,
+    /// Triangles that it keeps, in one instance. Where these are all that it has, or as many as at the level before, it has no
+    /// level for this target.
+    pub triangles: u64,
 }
 
 /// Why a level has the triangles it has.

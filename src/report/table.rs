@@ -187,6 +187,9 @@ pub fn target(target: &LevelTarget) -> String {
         LevelTarget::Error { limit, unit: ErrorUnit::Object } => format!("error {limit}"),
         LevelTarget::Pixels { limit, size } => format!("{limit} px at {size}"),
         LevelTarget::Appearance(limit) => format!("d_RMS {limit}"),
+        LevelTarget::SceneRatio(ratio) => format!("{} of the scene", percent(ratio)),
+        LevelTarget::SceneTriangles(triangles) => format!("{} triangles a scene", count(triangles)),
+        LevelTarget::SceneBytes(bytes) => format!("{} bytes a scene", count(bytes)),
     }
 }
 

@@ -45,6 +45,7 @@ fn mesh(hashes: &[u8], instances: u64, levels: &[u64]) -> MeshRecord {
         draw_calls: instances,
         copy_of: None,
         instance_of: None,
+        shares: Vec::new(),
         triangles,
         vertices: 600 * hashes.len() as u64,
         radius: 2.0,

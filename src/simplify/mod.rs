@@ -30,7 +30,7 @@ use crate::metric::naive::Naive;
 use crate::metric::qem::Qem;
 use crate::metric::qem_attributes::QemAttributes;
 use crate::metric::tmpm::Tmpm;
-use crate::metric::{ErrorMetric, Parted, Placement, Price};
+use crate::metric::{CostUnit, ErrorMetric, Parted, Placement, Price};
 use blocks::Sizes;
 use driver::Driver;
 use progressive::{Progressive, Recorder};
@@ -75,6 +75,14 @@ impl MetricKind {
     /// Whether it can put merged vertices there. All can put them onto one of the ends.
     pub fn can_place(self, placement: Placement) -> bool {
         placement == Placement::Subset || !matches!(self, Self::ItsPaper | Self::Tmpm)
+    }
+
+    /// What the costs in its sequences are.
+    pub fn cost_unit(self) -> CostUnit {
+        match self {
+            Self::Its | Self::Qem | Self::QemAttributes => CostUnit::SquareTimesArea,
+            Self::Naive | Self::Gaps | Self::ItsPaper | Self::Ias | Self::Aps | Self::Tmpm => CostUnit::Length,
+        }
     }
 }
 

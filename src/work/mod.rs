@@ -51,9 +51,25 @@ pub struct Baked {
     pub warnings: Vec<String>,
 }
 
+/// Sequences that are needed before all chains are planned.
+#[derive(Debug, Default)]
+pub struct Prepared {
+    /// By key.
+    pub sequences: BTreeMap<JobKey, Progressive>,
+    /// What was done for them.
+    baked: Baked,
+}
+
+/// Looks up or makes some of the sequences of `plan`.
+pub fn prepare(plan: &Plan, wanted: &BTreeSet<JobKey>, cache: &Cache, reporter: &dyn Reporter) -> Prepared {
+    let mut baked = Baked::default();
+    let sequences = recorded(plan, wanted, cache, reporter, &mut baked);
+    Prepared { sequences, baked }
+}
+
 /// Makes every chain of `plan` and the figures of their looks.
-pub fn work(plan: &Plan, cache: &Cache, load: LoadLooks, reporter: &dyn Reporter) -> Baked {
-    let mut out = Baked::default();
+pub fn work(plan: &Plan, prepared: Prepared, cache: &Cache, load: LoadLooks, reporter: &dyn Reporter) -> Baked {
+    let Prepared { sequences: ready, baked: mut out } = prepared;
     let found: Vec<(JobKey, Found<Chain>)> =
         plan.chains.par_iter().map(|(&key, _)| (key, look_up(cache, Bucket::Chains, key))).collect();
     let mut missing: Vec<(JobKey, &ChainTask)> = Vec::new();
@@ -64,7 +80,7 @@ pub fn work(plan: &Plan, cache: &Cache, load: LoadLooks, reporter: &dyn Reporter
             None => missing.push((key, &plan.chains[&key])),
         }
     }
-    let sequences = sequences(plan, &missing, cache, reporter, &mut out);
+    let sequences = sequences(plan, &missing, ready, cache, reporter, &mut out);
     let make = |key: JobKey, task: &ChainTask, looks: Option<&Arc<Looks>>| {
         let chain = cut(task, &sequences, looks);
         let warning = store(cache, Bucket::Chains, key, &chain);
@@ -310,18 +326,34 @@ fn record_looks(plan: &Plan, cache: &Cache, load: LoadLooks, reporter: &dyn Repo
 fn sequences(
     plan: &Plan,
     missing: &[(JobKey, &ChainTask)],
+    mut ready: BTreeMap<JobKey, Progressive>,
     cache: &Cache,
     reporter: &dyn Reporter,
     out: &mut Baked,
 ) -> BTreeMap<JobKey, Progressive> {
-    let wanted: BTreeSet<JobKey> =
+    let mut wanted: BTreeSet<JobKey> =
         missing.iter().flat_map(|(_, task)| task.parts.iter().flat_map(|p| p.sequences.iter().copied())).collect();
     for (key, task) in &plan.sequences {
-        if !wanted.contains(key) {
+        if !wanted.contains(key) && !ready.contains_key(key) {
             out.hits += 1;
             tell(reporter, task, true);
         }
     }
+    // Those whose chains were found are not needed any more.
+    ready.retain(|key, _| wanted.remove(key));
+    let mut sequences = recorded(plan, &wanted, cache, reporter, out);
+    sequences.append(&mut ready);
+    sequences
+}
+
+/// Sequences from the cache or made now.
+fn recorded(
+    plan: &Plan,
+    wanted: &BTreeSet<JobKey>,
+    cache: &Cache,
+    reporter: &dyn Reporter,
+    out: &mut Baked,
+) -> BTreeMap<JobKey, Progressive> {
     // The largest first, so that no core is left with it at the end.
     let mut order: Vec<(JobKey, &SequenceTask)> = wanted.iter().map(|&key| (key, &plan.sequences[&key])).collect();
     order.sort_by_key(|(key, task)| (std::cmp::Reverse(task.mesh.triangles()), *key));

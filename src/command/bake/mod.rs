@@ -10,6 +10,8 @@
 pub(super) mod record;
 mod parts;
 mod recover;
+mod seen;
+mod share;
 mod survey;
 mod sweep;
 mod wave;

@@ -31,7 +31,7 @@ pub struct SceneFacts {
 }
 
 /// First byte of remembered facts; another one means another shape of [`SceneFacts`].
-const VERSION: u8 = 8;
+const VERSION: u8 = 9;
 
 /// For the index.
 pub fn to_bytes(facts: &SceneFacts) -> Vec<u8> {
@@ -116,6 +116,7 @@ pub fn meshes(scene: &ReadScene, baked: &Baked, switches: impl Fn(f64, &[f64]) -
                 let levels = chain.levels.iter().zip(switches).enumerate();
                 levels.map(|(i, (level, at))| level_record(scene, level, looks.get(i), radius, at)).collect()
             }),
+            shares: scene.shares.get(source.index).cloned().unwrap_or_default(),
             notes,
         }
     };

@@ -9,6 +9,8 @@ use rayon::prelude::*;
 use super::Session;
 use super::record::{self, SceneFacts};
 use super::recover::{Instance, Recovered, recover};
+use super::seen;
+use super::share::{self, Waiting};
 use super::survey::Todo;
 use super::write::{Written, write_scene};
 use crate::appearance::assemble;
@@ -31,9 +33,9 @@ use crate::mesh::layout::frame;
 use crate::obj::{self, is_obj};
 use crate::plan::{MeshLook, MeshPlan, Plan};
 use crate::progress::Event;
-use crate::report::{PartsRecord, Problem, Severity, Status};
+use crate::report::{PartsRecord, Problem, Severity, ShareRecord, Status};
 use crate::scan::SceneFile;
-use crate::work::work;
+use crate::work::{prepare, work};
 
 /// Source bytes of one wave: what is in memory at a time is a small multiple of it, or of the largest scene.
 const WAVE_BYTES: u64 = 256 << 20;
@@ -68,7 +70,7 @@ pub struct ReadScene {
     pub parts: Option<PartsRecord>,
     /// Some of these are declared now: the document is not the source's.
     pub is_changed: bool,
-    /// Of the search for them.
+    /// Of the search for them, and of budgets that cannot be met.
     pub notes: Vec<Note>,
     /// By mesh: nodes that show it.
     pub uses: Vec<MeshUse>,
@@ -77,8 +79,14 @@ pub struct ReadScene {
     pub radii: Vec<f64>,
     /// By mesh, where looks are measured.
     looks: Vec<Option<MeshLook>>,
-    /// By mesh.
+    /// By mesh; empty while meshes wait for their shares of a budget.
     pub plans: Vec<MeshPlan>,
+    /// By mesh, where levels are budgets of the scene.
+    pub waiting: Vec<Waiting>,
+    /// By mesh, where levels are budgets of the scene: how large it is shown.
+    pub scales: Vec<f64>,
+    /// By mesh, where levels are budgets of the scene: what it gets of each.
+    pub shares: Vec<Vec<ShareRecord>>,
     pub seen: Seen,
     pub dependencies: Vec<index::Dependency>,
     /// Scene file and buffers.
@@ -115,16 +123,7 @@ impl Session<'_> {
                     self.summary.scene_bytes_read += scene.bytes;
                     let number = scenes.len();
                     scene.looks.iter_mut().flatten().for_each(|look| look.scene = number);
-                    let meshes = scene.scene.meshes.iter().zip(&scene.sub_meshes);
-                    scene.plans = meshes
-                        .map(|(source, subs)| {
-                            if let Some(plan) = scene.shown_elsewhere(source.index) {
-                                return plan;
-                            }
-                            let is_sealed = is_sealed(&scene.scene.document, source.index);
-                            plan.add(source, subs, is_sealed, scene.looks[source.index].as_ref(), &scene.todo.settings)
-                        })
-                        .collect();
+                    scene.plan(&mut plan);
                     scenes.push(scene);
                 }
                 Err(failure) => self.fail(failure),
@@ -150,9 +149,10 @@ impl Session<'_> {
         for scene in scenes {
             let chains: BTreeSet<JobKey> = scene.chain_keys().collect();
             let wanted = chains.iter().filter(|key| !is_cached(&self.cache, Bucket::Chains, key));
-            let sequences: BTreeSet<JobKey> = wanted
-                .flat_map(|key| plan.chains[key].parts.iter().flat_map(|part| part.sequences.iter().copied()))
-                .collect();
+            // What meshes would share is not known without the sequences: they are needed in any case.
+            let waiting = scene.waiting.iter().flatten().flatten();
+            let parts = wanted.flat_map(|key| &plan.chains[key].parts).chain(waiting);
+            let sequences: BTreeSet<JobKey> = parts.flat_map(|part| part.sequences.iter().copied()).collect();
             let jobs = sequences.iter().filter(|key| !is_cached(&self.cache, Bucket::Sequences, key)).count();
             let (path, reason) = (scene.todo.file.relative.clone(), scene.todo.reason.clone());
             self.context.reporter.event(&Event::ScenePlanned { path, reason, jobs: jobs as u64 });
@@ -163,9 +163,13 @@ impl Session<'_> {
 
     /// Bakes a wave.
     pub fn bake_wave(&mut self, wave: Vec<Todo>, output: &OutputFolder) {
-        let (scenes, plan) = self.read_wave(wave);
+        let (mut scenes, mut plan) = self.read_wave(wave);
+        let prepared = prepare(&plan, &share::wanted(&scenes), &self.cache, &*self.context.reporter);
+        for scene in &mut scenes {
+            share::plan(scene, &mut plan, &prepared.sequences);
+        }
         let load = |number: usize| scenes[number].load_looks();
-        let baked = work(&plan, &self.cache, &load, &*self.context.reporter);
+        let baked = work(&plan, prepared, &self.cache, &load, &*self.context.reporter);
         self.summary.jobs += baked.jobs as u64;
         self.summary.cache_hits += baked.hits as u64;
         self.summary.looks_milliseconds += baked.looked.as_millis() as u64;
@@ -235,10 +239,36 @@ impl ReadScene {
 }
 
 impl ReadScene {
-    /// The plan of a mesh whose nodes show the one that it is an instance of.
-    fn shown_elsewhere(&self, mesh: usize) -> Option<MeshPlan> {
+    /// Adds what the scene's meshes need.
+    fn plan(&mut self, plan: &mut Plan) {
+        let settings = &self.todo.settings;
+        let meshes = || self.scene.meshes.iter().zip(&self.sub_meshes);
+        let is_sealed = |source: &SourceMesh| is_sealed(&self.scene.document, source.index);
+        if settings.shares_a_budget() {
+            let parts = |(source, subs): (&SourceMesh, &Vec<SubMesh>)| match self.shown_elsewhere(source.index) {
+                Some(why) => Err(why),
+                None if self.uses[source.index].instances == 0 => Err("no node shows it"),
+                None => plan.parts(source, subs, is_sealed(source), settings),
+            };
+            self.waiting = meshes().map(parts).collect();
+            return;
+        }
+        let plans = |(source, subs): (&SourceMesh, &Vec<SubMesh>)| match self.shown_elsewhere(source.index) {
+            Some(why) => MeshPlan::Alone(why),
+            None => plan.add(source, subs, is_sealed(source), self.look(source.index), settings),
+        };
+        self.plans = meshes().map(plans).collect();
+    }
+
+    /// What a mesh looks like, where that is measured.
+    pub fn look(&self, mesh: usize) -> Option<&MeshLook> {
+        self.looks[mesh].as_ref()
+    }
+
+    /// Why a mesh has no levels of its own, if its nodes show the one that it is an instance of.
+    fn shown_elsewhere(&self, mesh: usize) -> Option<&'static str> {
         let declared = self.instances.get(&mesh).is_some_and(|instance| instance.kept.is_none());
-        (declared && self.uses[mesh].nodes == 0).then_some(MeshPlan::Alone("its nodes show the mesh that it repeats"))
+        (declared && self.uses[mesh].nodes == 0).then_some("its nodes show the mesh that it repeats")
     }
 
     /// Materials and textures. What is missing is told by the warnings of the scene's record.
@@ -300,6 +330,11 @@ fn read_scene(todo: Todo) -> Result<ReadScene, Failure> {
     let Recovered { scene, sub_meshes, instances, parts, folded, is_changed, notes } =
         recover(scene, &todo.settings.instances, base).map_err(refused)?;
     let uses = mesh_uses(&scene.document).map_err(refused)?;
+    let scales = if todo.settings.shares_a_budget() {
+        seen::scales(&scene, &todo.settings.scene).map_err(refused)?
+    } else {
+        Vec::new()
+    };
     Ok(ReadScene {
         instances,
         folded,
@@ -311,6 +346,9 @@ fn read_scene(todo: Todo) -> Result<ReadScene, Failure> {
         uses,
         radii: scene.meshes.iter().map(radius).collect(),
         plans: Vec::new(),
+        waiting: Vec::new(),
+        scales,
+        shares: Vec::new(),
         bytes: bytes.len() as u64 + buffers,
         sub_meshes,
         seen,
