@@ -1,12 +1,13 @@
 //! Which buffer of a `.gltf` must hold the levels too.
 //!
 //! Babylon.js asks for a buffer where it first meets it. Inside a finer level that is put off until all else has arrived;
-//! so, if an animation, a skin, an image or a mesh without levels needs the same buffer, each waits for the other and the
-//! scene never loads. The cure: levels behind the source's bytes in that buffer, which the coarsest level asks for at once. (In a
+//! so, if an animation, a skin, an image, the instances of a batch or a mesh without levels needs the same buffer, each waits for
+//! the other and the scene never loads. The cure: levels behind the source's bytes in that buffer, which the coarsest level asks for at once. (In a
 //! GLB all bytes are in one chunk, and nothing waits.) Knows nothing of bytes.
 
 use super::document::{Container, Document};
 use super::error::DocumentError;
+use super::instancing::INSTANCING;
 use super::json;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -28,7 +29,11 @@ pub(super) fn find(document: &Document, anchors: &BTreeSet<usize>) -> Result<Opt
     for (i, node) in nodes.iter().enumerate() {
         let meshes = index(node, "mesh").and_then(|mesh| finder.meshes.get(mesh));
         let skin = index(node, "skin").and_then(|skin| finder.skins.get(skin));
-        let of_mesh = meshes.map_or_else(BTreeSet::new, |mesh| finder.mesh(mesh));
+        let mut of_mesh = meshes.map_or_else(BTreeSet::new, |mesh| finder.mesh(mesh));
+        // The coarsest level of a batch asks for its instances at once: that is too late only if another group put it off.
+        let of_batch = finder.batch(node);
+        of_mesh.retain(|buffer| !of_batch.contains(buffer));
+        needed.extend(of_batch);
         let list = if anchors.contains(&i) { &mut put_off } else { &mut needed };
         list.extend(of_mesh);
         needed.extend(skin.and_then(|skin| finder.accessor(index(skin, "inverseBindMatrices"))));
@@ -64,6 +69,13 @@ impl Finder<'_> {
         let packed = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
         let packed = packed.iter().find_map(|name| json::extension(view, name));
         index(packed.unwrap_or(view), "buffer")
+    }
+
+    /// The buffers of a node's instances.
+    fn batch(&self, node: &Value) -> BTreeSet<usize> {
+        let attributes = json::extension(node, INSTANCING).and_then(|batch| batch.get("attributes")?.as_object());
+        let accessors = attributes.into_iter().flatten().filter_map(|(_, accessor)| json::integer(accessor));
+        accessors.filter_map(|accessor| self.accessor(Some(accessor as usize))).collect()
     }
 
     /// All buffers of a mesh.
@@ -125,6 +137,16 @@ mod tests {
         assert_eq!(host(&animated, &[0, 1]), Some(1));
         animated.container = Container::Glb;
         assert_eq!(host(&animated, &[0, 1]), None);
+    }
+
+    #[test]
+    fn instances_need_their_buffer_with_the_coarsest_level() {
+        let mut batches = document();
+        batches.json["bufferViews"][1]["buffer"] = json!(0);
+        batches.json["nodes"][1]["extensions"] = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "SCALE": 1 } } });
+        assert_eq!(host(&batches, &[0, 1]), Some(0), "level 0 of node 0 comes first and puts it off");
+        batches.json["nodes"][0]["extensions"] = batches.json["nodes"][1]["extensions"].clone();
+        assert_eq!(host(&batches, &[0, 1]), None, "both ask for it at once");
     }
 
     #[test]

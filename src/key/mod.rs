@@ -25,7 +25,7 @@ pub const ALGORITHM_VERSION: u32 = 8;
 pub const LOOK_VERSION: u32 = 1;
 
 /// Form of the outputs. Raise it in the commit that writes the same levels in another way.
-pub const EMIT_VERSION: u32 = 4;
+pub const EMIT_VERSION: u32 = 5;
 
 /// How the meshes of a scene share a budget. Raise it in the commit that shares the same budget in another way.
 pub const SHARE_VERSION: u32 = 1;

@@ -192,7 +192,7 @@ fn the_key_is_the_same_on_every_machine() {
     let [sequence, chain, scene] = keys(&settings(""), MeshParts::ALL);
     insta::assert_snapshot!(sequence, @"977ade5e909e7dda168da923a07a9ec468cda16142ad404788993576b0832d47");
     insta::assert_snapshot!(chain, @"505991637f50ddd66570258de7a21a65c14f9b271d47dff4466dc1bd7360d7a9");
-    insta::assert_snapshot!(scene, @"d988e5d2e03931667f1d51bd82ff3a8a7666c0ee577bf3772a768d1464898cbd");
+    insta::assert_snapshot!(scene, @"8ebcc5452c5f34728b00441dd4a22ab79878f2dda15c6971c003a2aaf5c065dd");
     assert_eq!(sequence.to_string().parse(), Ok(sequence));
     assert!("x".parse::<JobKey>().is_err());
 }

@@ -148,8 +148,10 @@ async function draw(view, size) {
   return rgba;
 }
 
+const drawnTimes = (mesh) => (mesh.hasThinInstances ? mesh.thinInstanceCount : 1);
+
 function triangles() {
-  return shown().reduce((sum, mesh) => sum + mesh.getTotalIndices() / 3, 0);
+  return shown().reduce((sum, mesh) => sum + (mesh.getTotalIndices() / 3) * drawnTimes(mesh), 0);
 }
 
 function facts() {
@@ -162,6 +164,7 @@ function facts() {
     vertices: meshes.reduce((sum, mesh) => sum + mesh.getTotalVertices(), 0),
     skinned: meshes.filter((mesh) => mesh.skeleton).length,
     morphed: meshes.filter((mesh) => mesh.morphTargetManager?.numTargets > 0).length,
+    drawn: meshes.reduce((sum, mesh) => sum + drawnTimes(mesh), 0),
     instances: meshes.reduce((sum, mesh) => sum + (mesh.hasThinInstances ? mesh.thinInstanceCount : 0), 0),
     materials: [...materials].map((material) => material?.name ?? '').sort(),
     textures: textures.size,

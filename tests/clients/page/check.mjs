@@ -16,17 +16,22 @@ const LATER = 0.5;
 /** Software GL takes seconds for a picture of more triangles than this: one view must do. */
 const MANY_TRIANGLES = 300_000;
 
-/** Pixels that differ, and by how much at most in one channel. */
+/** Luminance of the pixel at byte `i`, 0..255 (BT.709 weights). */
+const luminance = (rgba, i) => 0.2126 * rgba[i] + 0.7152 * rgba[i + 1] + 0.0722 * rgba[i + 2];
+
+/** Pixels that differ, by how much at most in one channel, and the square of the difference of luminance of each. */
 function difference(a, b) {
   let pixels = 0;
   let most = 0;
+  const squares = [];
   const [x, y] = [new Uint32Array(a.buffer), new Uint32Array(b.buffer)];
   for (let i = 0; i < x.length; i++) {
     if (x[i] === y[i]) continue;
     pixels++;
     for (let c = 4 * i; c < 4 * i + 4; c++) most = Math.max(most, Math.abs(a[c] - b[c]));
+    squares.push((luminance(a, 4 * i) - luminance(b, 4 * i)) ** 2);
   }
-  return { pixels, most };
+  return { pixels, most, squares };
 }
 
 /** Pixels that something was drawn on. */
@@ -88,7 +93,7 @@ export function client(engine) {
       const differing = kept.output
         .map((shot, i) => ({ shot: i, view: shot.view, time: shot.time, ...compare(kept.source[i], shot) }))
         .filter((found) => found.pixels > 0);
-      return { facts, differing };
+      return { facts, differing, pictures: kept.output.length };
     },
     /** Shows each level of the output alone, from one side: the triangles and the pixels drawn. */
     async levels(url, plan) {
@@ -102,5 +107,5 @@ export function client(engine) {
 }
 
 function compare(before, after) {
-  return before ? difference(before.rgba, after.rgba) : { pixels: Infinity, most: 255 };
+  return before ? difference(before.rgba, after.rgba) : { pixels: Infinity, most: 255, squares: [Infinity] };
 }

@@ -141,6 +141,7 @@ function facts() {
     vertices: objects.reduce((sum, object) => sum + (object.geometry.attributes.position?.count ?? 0), 0),
     skinned: objects.filter((object) => object.isSkinnedMesh).length,
     morphed: objects.filter((object) => object.morphTargetInfluences?.length > 0).length,
+    drawn: objects.reduce((sum, object) => sum + (object.isInstancedMesh ? object.count : 1), 0),
     instances: objects.reduce((sum, object) => sum + (object.isInstancedMesh ? object.count : 0), 0),
     materials: [...materials].map((material) => `${material.type} ${material.name}`).sort(),
     textures: textures.size,
