@@ -22,6 +22,11 @@ pub struct TriangleList {
     pub leftover: usize,
 }
 
+/// Whether no index is there twice.
+pub fn is_whole(t: &[u32; 3]) -> bool {
+    t[0] != t[1] && t[1] != t[2] && t[2] != t[0]
+}
+
 /// Writes out the triangles, in their order and with their winding.
 pub fn triangle_list(mut indices: Vec<u32>, topology: Topology) -> TriangleList {
     let leftover = match topology {
@@ -42,7 +47,6 @@ pub fn triangle_list(mut indices: Vec<u32>, topology: Topology) -> TriangleList 
         }
     }
     let before = indices.len() / 3;
-    let is_whole = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
     if !indices.as_chunks::<3>().0.iter().all(is_whole) {
         indices = indices.as_chunks::<3>().0.iter().copied().filter(is_whole).flatten().collect();
     }

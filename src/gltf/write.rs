@@ -9,7 +9,7 @@ use super::document::{Document, Problem};
 use super::encode::{Encoded, Layout};
 use super::error::DocumentError;
 use super::json;
-use crate::mesh::{ComponentType, Format};
+use crate::mesh::{ComponentType, Format, index_bytes};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -184,8 +184,7 @@ impl Streams {
         indices: &[u32],
         vertices: usize,
     ) -> Result<usize, WriteError> {
-        // 65535 is the restart value of 16-bit indices and never names a vertex.
-        let component = if vertices < 65535 { ComponentType::U16 } else { ComponentType::U32 };
+        let component = if index_bytes(vertices) == 2 { ComponentType::U16 } else { ComponentType::U32 };
         let bytes: Vec<u8> = match component {
             ComponentType::U16 => indices.iter().flat_map(|&i| (i as u16).to_le_bytes()).collect(),
             _ => indices.iter().flat_map(|&i| i.to_le_bytes()).collect(),

@@ -1,13 +1,10 @@
 //! Which primitives touch: those with a vertex position in common that lies on a border of both.
 //!
-//! Positions are compared bit for bit (with one zero). Sorting does all the work, so the time is near-linear for any
-//! input and the result does not depend on chance.
+//! Sorting does all the work, so the time is near-linear for any input and the result does not depend on chance.
 
+use super::places::{Key, places};
 use crate::mesh::Primitive;
-use crate::mesh::hash::positive_zero;
-
-/// A position by its bits.
-type Key = [u32; 3];
+use crate::mesh::sets::Sets;
 
 /// Groups of primitives that touch, directly or through others; members ascending, groups by first member.
 pub fn groups(primitives: &[&Primitive]) -> Vec<Vec<usize>> {
@@ -19,15 +16,15 @@ pub fn groups(primitives: &[&Primitive]) -> Vec<Vec<usize>> {
         border.extend(border_positions(primitives[i]).into_iter().map(|key| (key, i)));
     }
     border.sort_unstable();
-    let mut parents: Vec<usize> = (0..primitives.len()).collect();
+    let mut sets = Sets::new(primitives.len());
     for pair in border.windows(2) {
         if pair[0].0 == pair[1].0 {
-            join(&mut parents, pair[0].1, pair[1].1);
+            sets.join(pair[0].1, pair[1].1);
         }
     }
     let mut groups: Vec<Vec<usize>> = vec![Vec::new(); primitives.len()];
     for i in 0..primitives.len() {
-        groups[find(&mut parents, i)].push(i);
+        groups[sets.root(i)].push(i);
     }
     // The smaller index always becomes the root, so the groups already stand in order.
     groups.retain(|group| !group.is_empty());
@@ -71,7 +68,7 @@ fn bounds(primitive: &Primitive) -> [[f32; 3]; 2] {
 
 /// Positions of vertices on border edges: edges of a single triangle, once vertices at the same place are one.
 fn border_positions(primitive: &Primitive) -> Vec<Key> {
-    let (weld, keys) = weld(primitive);
+    let (weld, keys) = places(primitive.positions());
     let mut edges: Vec<(u32, u32)> = Vec::with_capacity(primitive.indices.len());
     for triangle in primitive.indices.as_chunks::<3>().0 {
         let [a, b, c] = triangle.map(|i| weld[i as usize]);
@@ -88,36 +85,6 @@ fn border_positions(primitive: &Primitive) -> Vec<Key> {
         }
     }
     keys.into_iter().zip(on_border).filter_map(|(key, border)| border.then_some(key)).collect()
-}
-
-/// For each vertex the number of its place, and the key of each place.
-fn weld(primitive: &Primitive) -> (Vec<u32>, Vec<Key>) {
-    let mut sorted: Vec<(Key, u32)> =
-        (0..).zip(primitive.positions()).map(|(i, position)| (position.map(positive_zero), i)).collect();
-    sorted.sort_unstable();
-    let mut place = vec![0u32; primitive.count];
-    let mut keys: Vec<Key> = Vec::new();
-    for (key, vertex) in sorted {
-        if keys.last() != Some(&key) {
-            keys.push(key);
-        }
-        place[vertex as usize] = (keys.len() - 1) as u32;
-    }
-    (place, keys)
-}
-
-/// The root of a set, halving the path to it.
-fn find(parents: &mut [usize], mut i: usize) -> usize {
-    while parents[i] != i {
-        parents[i] = parents[parents[i]];
-        i = parents[i];
-    }
-    i
-}
-
-fn join(parents: &mut [usize], a: usize, b: usize) {
-    let (a, b) = (find(parents, a), find(parents, b));
-    parents[a.max(b)] = a.min(b);
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ pub mod borders;
 pub mod instances;
 pub mod inventory;
 pub mod parts;
+mod places;
 
 use crate::gltf::document::{Document, DocumentError};
 use crate::gltf::json;

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use super::{ChainSettings, Part, Refit, Storage, Target};
 use crate::distance::near::Sheet;
-use crate::mesh::{Attribute, Level, LevelPrimitive, LevelVertices, Mesh, Primitive};
+use crate::mesh::{Level, LevelPrimitive, LevelVertices, Mesh, Primitive, index_bytes};
 use crate::simplify::progressive::Progressive;
 use crate::simplify::replay::refit::{Fit, Importance};
 use crate::simplify::replay::{CutPrimitive, Replay, Welded};
@@ -157,11 +157,8 @@ impl<'a> Cutter<'a> {
     }
 
     fn shares(&self, source: &Primitive, cut: &CutPrimitive) -> bool {
-        let index_size = |vertices: usize| if vertices < usize::from(u16::MAX) { 2 } else { 4 };
-        let sets = source.targets.iter().flatten().chain(&source.attributes);
-        let stride: usize = sets.map(Attribute::row_bytes).sum();
-        let shared = cut.indices.len() * index_size(source.count);
-        let compact = cut.indices.len() * index_size(cut.wedges.len()) + cut.wedges.len() * stride;
+        let shared = cut.indices.len() * index_bytes(source.count);
+        let compact = cut.indices.len() * index_bytes(cut.wedges.len()) + cut.wedges.len() * source.row_bytes();
         match self.settings.storage {
             Storage::Shared => true,
             Storage::Compact => false,

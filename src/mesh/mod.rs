@@ -5,6 +5,7 @@
 
 pub mod hash;
 pub mod layout;
+pub mod sets;
 pub mod topology;
 pub mod visible;
 pub mod weld;
@@ -134,6 +135,11 @@ impl Primitive {
     pub fn triangles(&self) -> usize {
         self.indices.len() / 3
     }
+
+    /// Bytes of all that is kept of one vertex, as it is written.
+    pub fn row_bytes(&self) -> usize {
+        self.attributes.iter().chain(self.targets.iter().flatten()).map(Attribute::row_bytes).sum()
+    }
 }
 
 /// A sub-mesh: the smallest group of one mesh's primitives that share border vertices. It is the unit that is
@@ -194,6 +200,12 @@ pub struct Level {
     pub error: f64,
 }
 
+/// Bytes of an index into this many vertices, as indices are written: 65535 is the restart value of two-byte indices and never
+/// names a vertex.
+pub fn index_bytes(vertices: usize) -> usize {
+    if vertices < usize::from(u16::MAX) { 2 } else { 4 }
+}
+
 impl LevelPrimitive {
     /// Bytes of its arrays as they are written: indices of two bytes where they fit, rows of vertices padded to four.
     pub fn bytes(&self) -> usize {
@@ -201,7 +213,6 @@ impl LevelPrimitive {
             LevelVertices::Source => self.indices.iter().max().map_or(0, |&most| most as usize + 1),
             LevelVertices::Own(own) => own.count,
         };
-        let index_size = if vertices < usize::from(u16::MAX) { 2 } else { 4 };
         let own = match &self.vertices {
             LevelVertices::Source => 0,
             LevelVertices::Own(own) => {
@@ -209,7 +220,7 @@ impl LevelPrimitive {
                     * own.attributes.iter().chain(own.targets.iter().flatten()).map(Attribute::row_bytes).sum::<usize>()
             }
         };
-        self.indices.len() * index_size + own
+        self.indices.len() * index_bytes(vertices) + own
     }
 }
 

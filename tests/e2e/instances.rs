@@ -141,18 +141,8 @@ fn batches_switch_levels_as_one_and_the_report_tells_what_is_none() {
     assert_eq!(record["batches"]["stayed"]["they have `extras` or a camera"], 1);
     assert!(space.run_fine(&["pipeline.toml"]).stderr.contains("no work"));
     // The same scene by the eye of the program itself.
-    let told = space.run_fine(&[
-        "--json",
-        "evaluate",
-        "--size",
-        "64",
-        "--samples",
-        "100",
-        "scenes/field.glb",
-        "out/field.glb",
-    ]);
-    let d_rms = &told.document()["candidates"][0]["d_rms"];
-    assert!(d_rms.as_f64().unwrap() < 0.05, "{d_rms}");
+    let d_rms = space.difference("scenes/field.glb", "out/field.glb", 64);
+    assert!(d_rms < 0.05, "{d_rms}");
     space.write("pipeline.toml", pipeline("required = false"));
     space.run_fine(&["pipeline.toml"]);
     assert_eq!(space.json("out/field.gltf").get("extensionsRequired"), None);
@@ -191,10 +181,8 @@ fn parts_of_one_mesh_become_instances() {
             let told = space.run_fine(&["pipeline.toml", "--jobs", "3"]);
             assert_eq!(told.stderr.contains("48 (2 different) on 96 nodes"), !more.is_empty(), "{}", told.stderr);
             assert!(space.run_fine(&["pipeline.toml"]).stderr.contains("no work"));
-            let (source, out) = ("scenes/machine.glb", "out/machine.glb");
-            let told = space.run_fine(&["--json", "evaluate", "--size", "96", "--samples", "100", source, out]);
-            let d_rms = &told.document()["candidates"][0]["d_rms"];
-            assert!(d_rms.as_f64().unwrap() < 0.05, "{more}: {d_rms}");
+            let d_rms = space.difference("scenes/machine.glb", "out/machine.glb", 96);
+            assert!(d_rms < 0.05, "{more}: {d_rms}");
             space
         })
         .collect();

@@ -104,6 +104,13 @@ impl Space {
         run
     }
 
+    /// How far the program itself sees a scene from another one: d_RMS of 24 views of `size` pixels a side.
+    pub fn difference(&self, source: &str, output: &str, size: u32) -> f64 {
+        let size = size.to_string();
+        let told = self.run_fine(&["--json", "evaluate", "--size", &size, "--samples", "100", source, output]);
+        told.document()["candidates"][0]["d_rms"].as_f64().expect("a figure")
+    }
+
     /// Keeps the folder and says where it is; for a look at a failing test.
     #[expect(dead_code, reason = "called by hand while a test is being mended")]
     pub fn eject(mut self) -> ! {

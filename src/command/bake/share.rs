@@ -12,7 +12,7 @@ use crate::config::LevelTarget;
 use crate::gltf::share::Note;
 use crate::key::JobKey;
 use crate::mesh::hash::MeshHash;
-use crate::mesh::{Attribute, Mesh, Primitive};
+use crate::mesh::{Mesh, Primitive, index_bytes};
 use crate::metric::CostUnit;
 use crate::plan::{MeshPlan, PartTask, Plan, simplify_settings};
 use crate::report::ShareRecord;
@@ -168,10 +168,8 @@ fn bytes_of_levels(mesh: &Mesh, sequence: &Progressive) -> Vec<(usize, u64)> {
     loop {
         replay.advance(steps);
         let cuts = replay.primitives();
-        let size = |(primitive, cut): (&Primitive, &CutPrimitive)| {
-            cut.wedges.len() as u64 * row(primitive) + index_bytes(cut.wedges.len()) * cut.indices.len() as u64
-        };
-        let bytes: u64 = mesh.primitives.iter().zip(&cuts).map(size).sum();
+        let cut = |(primitive, cut): (&Primitive, &CutPrimitive)| size(primitive, cut.wedges.len(), cut.indices.len());
+        let bytes: u64 = mesh.primitives.iter().zip(&cuts).map(cut).sum();
         let least = levels.last().map_or(u64::MAX, |(_, bytes)| *bytes);
         levels.push((steps, bytes.min(least)));
         if steps == sequence.steps.len() {
@@ -186,16 +184,12 @@ fn left_alone<'a>(fixed_bytes: u64, unit: CostUnit) -> SceneMesh<'a> {
     SceneMesh { parts: Vec::new(), fixed: 0, fixed_bytes, unit, instances }
 }
 
-/// Bytes of one vertex as the source keeps it, without compression.
-fn row(primitive: &Primitive) -> u64 {
-    let sets = primitive.targets.iter().flatten().chain(&primitive.attributes);
-    sets.map(Attribute::row_bytes).sum::<usize>() as u64
-}
-
+/// Of a primitive as the source keeps it, without compression.
 fn bytes(primitive: &Primitive) -> u64 {
-    primitive.count as u64 * row(primitive) + index_bytes(primitive.count) * primitive.indices.len() as u64
+    size(primitive, primitive.count, primitive.indices.len())
 }
 
-fn index_bytes(vertices: usize) -> u64 {
-    if vertices < usize::from(u16::MAX) { 2 } else { 4 }
+/// Of so many vertices and indices of a primitive.
+fn size(primitive: &Primitive, vertices: usize, indices: usize) -> u64 {
+    (vertices * primitive.row_bytes() + indices * index_bytes(vertices)) as u64
 }

@@ -4,6 +4,7 @@ use crate::gltf::document::Document;
 use crate::gltf::error::DocumentError;
 use crate::gltf::json;
 use crate::gltf::share::{index, names};
+use crate::mesh::sets::Sets;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Accessors with the same numbers of vertices, and who uses them.
@@ -20,7 +21,8 @@ pub(super) struct Domains(Vec<Domain>);
 
 impl Domains {
     pub(super) fn new(document: &Document) -> Result<Self, DocumentError> {
-        let mut parents: Vec<usize> = (0..document.array("accessors")?.len()).collect();
+        let accessors = document.array("accessors")?.len();
+        let mut sets = Sets::new(accessors);
         let mut first: Vec<((usize, usize), usize)> = Vec::new();
         for (mesh, entry) in document.array("meshes")?.iter().enumerate() {
             let place = format!("meshes[{mesh}]");
@@ -30,17 +32,16 @@ impl Domains {
                 let Some(one) = own.next() else { continue };
                 first.push(((mesh, i), one));
                 for other in own {
-                    let (a, b) = (find(&mut parents, one), find(&mut parents, other));
-                    parents[a.max(b)] = a.min(b);
+                    sets.join(one, other);
                 }
             }
         }
         let mut domains: BTreeMap<usize, Domain> = BTreeMap::new();
         for (user, accessor) in first {
-            domains.entry(find(&mut parents, accessor)).or_default().users.push(user);
+            domains.entry(sets.root(accessor)).or_default().users.push(user);
         }
-        for accessor in 0..parents.len() {
-            if let Some(domain) = domains.get_mut(&find(&mut parents, accessor)) {
+        for accessor in 0..accessors {
+            if let Some(domain) = domains.get_mut(&sets.root(accessor)) {
                 domain.accessors.insert(accessor);
             }
         }
@@ -50,13 +51,4 @@ impl Domains {
     pub(super) fn all(&self) -> &[Domain] {
         &self.0
     }
-}
-
-/// The root of a set, halving the path to it.
-fn find(parents: &mut [usize], mut i: usize) -> usize {
-    while parents[i] != i {
-        parents[i] = parents[parents[i]];
-        i = parents[i];
-    }
-    i
 }

@@ -7,6 +7,7 @@ use crate::gltf::buffers::Buffers;
 use crate::gltf::document::Document;
 use crate::gltf::error::DocumentError;
 use crate::gltf::share::{index, names};
+use crate::gltf::triangles::is_whole;
 use crate::gltf::views::Views;
 use crate::mesh::ComponentType;
 use serde_json::Value;
@@ -102,9 +103,8 @@ struct List {
 
 impl List {
     fn new(indices: Vec<u32>) -> Self {
-        let is_listed = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
         let threes = (0..).zip(indices.as_chunks::<3>().0);
-        let triangles = threes.filter(|(_, t)| is_listed(t)).map(|(three, _)| three).collect();
+        let triangles = threes.filter(|(_, t)| is_whole(t)).map(|(three, _)| three).collect();
         Self { indices, triangles }
     }
 

@@ -6,7 +6,9 @@
 //! often. Labels are sums of mixed bits: a chance collision costs time, never a wrong match, since all is verified.
 
 use super::grid::Grid;
+use crate::identify::places::{Key, places};
 use crate::mesh::hash::positive_zero;
+use crate::mesh::sets::Sets;
 use crate::mesh::{Attribute, Primitive};
 use glam::DVec3;
 
@@ -190,51 +192,33 @@ pub(super) fn fixed_values<'p>(primitive: &'p Primitive, vertex: u32) -> impl It
     own.chain(primitive.targets.iter().flatten().flat_map(move |a| row(a, 0)))
 }
 
-/// Different positions by their bits, and which of them each corner has.
+/// Different positions, and which of them each corner has.
 fn spots(points: &[[f32; 3]]) -> (Vec<DVec3>, Vec<u32>) {
-    let mut sorted: Vec<([u32; 3], u32)> = (0..).zip(points).map(|(i, p)| (p.map(positive_zero), i)).collect();
-    sorted.sort_unstable();
-    let mut spots = Vec::new();
-    let mut of = vec![0u32; points.len()];
-    for run in sorted.chunk_by(|a, b| a.0 == b.0) {
-        for &(_, corner) in run {
-            of[corner as usize] = spots.len() as u32;
-        }
-        spots.push(DVec3::from_array(run[0].0.map(|bits| f64::from(f32::from_bits(bits)))));
-    }
-    (spots, of)
-}
-
-/// The root of a set, halving the path to it.
-fn root(parents: &mut [u32], mut i: u32) -> u32 {
-    while parents[i as usize] != i {
-        parents[i as usize] = parents[parents[i as usize] as usize];
-        i = parents[i as usize];
-    }
-    i
+    let (of, keys) = places(points);
+    let spot = |key: Key| DVec3::from_array(key.map(|bits| f64::from(f32::from_bits(bits))));
+    (keys.into_iter().map(spot).collect(), of)
 }
 
 /// Joins spots within `reach` of each other: the place of each spot, and the first spot of each place.
 fn join(spots: &[DVec3], grid: &Grid, reach: f64) -> (Vec<u32>, Vec<u32>) {
-    let mut parents: Vec<u32> = (0..spots.len() as u32).collect();
+    let mut sets = Sets::new(spots.len());
     for i in 0..spots.len() as u32 {
         let here = spots[i as usize];
         for other in grid.near(here, reach).filter(|&other| other < i) {
             if spots[other as usize].distance_squared(here) <= reach * reach {
-                let (a, b) = (root(&mut parents, i), root(&mut parents, other));
-                parents[a.max(b) as usize] = a.min(b);
+                sets.join(i as usize, other as usize);
             }
         }
     }
     let mut places = vec![0u32; spots.len()];
     let mut first = Vec::new();
     for i in 0..spots.len() as u32 {
-        let root = root(&mut parents, i);
-        if root == i {
-            places[i as usize] = first.len() as u32;
+        let root = sets.root(i as usize);
+        if root == i as usize {
+            places[root] = first.len() as u32;
             first.push(i);
         } else {
-            places[i as usize] = places[root as usize];
+            places[i as usize] = places[root];
         }
     }
     (places, first)

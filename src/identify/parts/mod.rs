@@ -11,7 +11,7 @@ mod tests;
 use super::alike::{Kind, Match, Residual, find_parts};
 use crate::gltf::scene::{SourceMesh, SourcePrimitive};
 use crate::gltf::similarity::Similarity;
-use crate::mesh::{Attribute, Primitive};
+use crate::mesh::{Attribute, Primitive, index_bytes};
 use components::components;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -261,8 +261,7 @@ fn bytes(mesh: &SourceMesh, part: &Part) -> u64 {
     let of = |(primitive, triangles): &(usize, Vec<u32>)| {
         let SourcePrimitive::Triangles(source) = &mesh.primitives[*primitive] else { return 0 };
         let vertices = used(source, triangles).len();
-        let index = if vertices < usize::from(u16::MAX) { 2 } else { 4 };
-        vertices * source.attributes.iter().map(Attribute::row_bytes).sum::<usize>() + triangles.len() * 3 * index
+        vertices * source.row_bytes() + triangles.len() * 3 * index_bytes(vertices)
     };
     part.triangles.iter().map(of).sum::<usize>() as u64
 }
